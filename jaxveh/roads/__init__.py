@@ -1,4 +1,4 @@
-"""Friction, grade and bank along the way: a place on the road goes in, its surface comes out."""
+"""Friction, grade, bank and unevenness along a road: each road returns its surface at a given position."""
 
 from jaxveh.roads.base import AbstractRoad, Surface
 from jaxveh.roads.combined import Combined

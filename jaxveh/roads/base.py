@@ -1,4 +1,4 @@
-"""The one contract of a road: a place on it goes in, friction and slopes come out."""
+"""The interface of all roads: a road returns friction, slopes and height at a given position."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from jaxveh._core.parameter import check_parameters
 
 
 class Surface(NamedTuple):
-    """A road at one place.
+    """The surface of a road at one position.
 
-    - `friction` (-): over that of the road on which the tyres' parameters hold.
+    - `friction` (-): friction of this road over that of the road on which the tyres' parameters hold.
     - `grade` (rad): positive uphill along the road; its tangent is the slope dz/ds.
     - `bank` (rad): positive where the left side is higher; its tangent is the slope dz/dy.
-    - `height` (m): of the unevenness over the plane that grade and bank tilt; wheels on springs feel it, it tilts nothing.
+    - `height` (m): height of the unevenness over the plane that grade and bank tilt. It acts on sprung wheels and does not
+      tilt the car's gravity.
     """
 
     friction: Any
@@ -28,10 +29,10 @@ class Surface(NamedTuple):
 
 
 class AbstractRoad(eqx.Module):
-    """A road along the world's x axis; array leaves are its parameters.
+    """A road along the world's x axis. Its array leaves are its parameters.
 
-    Slopes are quasi-static: they tilt gravity where the car is. That the car turns with a road whose grade or bank changes,
-    and what its curvature does to loads, is left out, by vehicles and by devices.
+    Slopes are quasi-static: they tilt gravity at the car's position. Vehicles and devices neglect the car's rotation with a
+    changing grade or bank, and the effect of the road's curvature on the loads.
 
     **Raises** `InputError` for parameters outside their domain.
     """
@@ -43,12 +44,12 @@ class AbstractRoad(eqx.Module):
     def at(self, s: Any, y: Any = 0.0) -> Surface:
         """The surface `s` m along the road and `y` m to the left of its centre line, elementwise.
 
-        Fields have the shape to which s, y and the road's parameters broadcast, and the parameters' type.
+        The fields have the shape to which s, y and the road's parameters broadcast, and the parameters' dtype.
         """
 
 
 def place(s: Any, y: Any, like: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """s and y as arrays of a parameter's type."""
+    """s and y as arrays of a parameter's dtype."""
     dtype = jnp.result_type(like)
     return jnp.asarray(s, dtype), jnp.asarray(y, dtype)
 
@@ -56,7 +57,7 @@ def place(s: Any, y: Any, like: jax.Array) -> tuple[jax.Array, jax.Array]:
 def surface(
     s: jax.Array, y: jax.Array, friction: Any, grade: Any = None, bank: Any = None, height: Any = None
 ) -> Surface:
-    """A surface whose fields all have one shape; a slope or a height that is not given is zero."""
+    """A surface whose fields all have the same shape. Slopes and height are zero if not given."""
     zero = jnp.zeros_like(s)
     values = [friction, *[zero if value is None else value for value in (grade, bank, height)]]
     shape = jnp.broadcast_shapes(*[jnp.shape(value) for value in (s, y, *values)])

@@ -1,4 +1,4 @@
-"""The friction of one road on the shape of another, and the unevenness of a third."""
+"""A road that takes its friction, slopes and unevenness from different roads."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from jaxveh.roads.base import AbstractRoad, Surface
 
 
 class Combined(AbstractRoad):
-    """A road with the `friction` of one road, the `grade` of another, the `bank` of a third and the `height` of a fourth (None:
-    of the second).
+    """A road with the `friction` of one road, the `grade` of another, the `bank` of a third and the `height` of a fourth.
 
-    **Raises** `InputError` for a part that is no road.
+    Where `bank` or `height` is None, the road of `grade` gives it.
+
+    **Raises** `InputError` for a part that is not a road.
     """
 
     friction: AbstractRoad

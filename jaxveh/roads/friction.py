@@ -1,4 +1,4 @@
-"""Level roads: one friction, two side by side, or one after the other."""
+"""Level roads with one friction, with two side by side, or with one after the other."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jaxveh.roads.base import AbstractRoad, Surface, place, surface
 
 
 class Level(AbstractRoad):
-    """A level road of one `friction` (-, default 1).
+    """A level road with one `friction` (-, default 1).
 
     **Raises** `InputError` for a friction that is not positive.
     """
@@ -26,8 +26,8 @@ class Level(AbstractRoad):
 class SplitMu(AbstractRoad):
     """A level road with one friction on the left and another on the right, blended smoothly about their border.
 
-    `left`, `right` (-): frictions. `blend` (m, default 0.2): the width over which one becomes the other. `border` (m,
-    default 0): where its middle lies, left of the centre line.
+    `left`, `right` (-): frictions. `blend` (m, default 0.2): the width of the transition between them. `border` (m,
+    default 0): the position of the transition's middle, positive to the left of the centre line.
 
     **Raises** `InputError` for a friction or blend that is not positive.
     """
@@ -44,10 +44,10 @@ class SplitMu(AbstractRoad):
 
 
 class MuJump(AbstractRoad):
-    """A level road whose friction changes along the way.
+    """A level road whose friction changes once along the road.
 
-    `before`, `after` (-): frictions. `at_distance` (m): where the change begins; `ramp` (m, default 0.5): how long it
-    takes, smoothly.
+    `before`, `after` (-): frictions. `at_distance` (m): where the change begins; `ramp` (m, default 0.5): the length over
+    which the friction changes smoothly.
 
     **Raises** `InputError` for a friction or ramp that is not positive.
     """

@@ -1,4 +1,4 @@
-"""What a car's wheels stand on: a road seen from the car."""
+"""The ground under a car's wheels: a road in the car's axes."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from jaxveh.roads.base import AbstractRoad
 
 
 class Ground(NamedTuple):
-    """What a car's wheels stand on, in the car's own directions.
+    """The ground under a car's wheels, in the car's axes.
 
-    - `friction_fl`, `friction_fr`, `friction_rl`, `friction_rr` (-): over that of the road on which the tyres'
-      parameters hold; front left, front right, rear left, rear right.
+    - `friction_fl`, `friction_fr`, `friction_rl`, `friction_rr` (-): friction under the front left, front right, rear left
+      and rear right wheel, over that of the road on which the tyres' parameters hold.
     - `grade` (rad): positive uphill in the direction in which the car points.
     - `bank` (rad): positive where the car's left side is higher.
-    - `height_fl`, `height_fr`, `height_rl`, `height_rr` (m): of the road's unevenness under each wheel. Cars whose wheels are
-      not sprung know nothing of it.
+    - `height_fl`, `height_fr`, `height_rl`, `height_rr` (m): height of the road's unevenness under each wheel. Models without
+      sprung wheels ignore it.
     """
 
     friction_fl: Any = 1.0
@@ -36,14 +36,14 @@ class Ground(NamedTuple):
 
 
 LEVEL = Ground()
-"""A level road with the friction of the one on which the tyres' parameters hold."""
+"""A level road with the friction of the road on which the tyres' parameters hold."""
 
 
 def under(road: AbstractRoad, x: Any, y: Any, yaw: Any, wheels: Sequence[tuple[Any, Any]]) -> Ground:
-    """The ground under a car at the world's `x`, `y` (m) that points along `yaw` (rad, left of the road's direction).
+    """The ground under a car at the world's `x`, `y` (m) with the heading `yaw` (rad, to the left of the road's direction).
 
-    `wheels`: the wheels' positions in the body, (forward, left) of the centre of gravity in m, in the order front left,
-    front right, rear left, rear right. Friction and height are looked up under each wheel, slopes under the centre of gravity:
+    `wheels`: the wheels' positions (forward, left) relative to the centre of gravity in m, in the order front left, front
+    right, rear left, rear right. Friction and height are those under each wheel, slopes those under the centre of gravity:
 
         tan(grade_car) =  tan(grade) cos(yaw) + tan(bank) sin(yaw)
         tan(bank_car)  = -tan(grade) sin(yaw) + tan(bank) cos(yaw)

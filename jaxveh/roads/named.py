@@ -1,4 +1,4 @@
-"""Roads by name, and from files."""
+"""Roads by name and from files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from jaxveh.roads.slopes import Banked
 
 
 class NamedRoad(NamedTuple):
-    """How to make a road, what to say about it, and whether it is random: then it may be made from a key."""
+    """A road by name. `make`: the function that makes it; `help`: its description; `random`: whether `make` takes a key."""
 
     make: Callable[..., AbstractRoad]
     help: str
@@ -42,14 +42,14 @@ ROADS: dict[str, NamedRoad] = {
     "split-mu": NamedRoad(lambda: SplitMu(1.0, 0.3), "level, 0.3 of that friction right of the centre line"),
     "mu-jump": NamedRoad(lambda: MuJump(1.0, 0.4, 50.0), "level, 0.4 of that friction from 50 m on"),
     "hills": NamedRoad(_hills, "random grade: standard deviation 3 %, correlation length 150 m", random=True),
-    "uneven": NamedRoad(_uneven, "level but uneven: class C of ISO 8608, felt by cars on springs alone", random=True),
-    "banked": NamedRoad(lambda: Banked(0.05), "tilts to 0.05 rad (left side higher) within 50 m"),
+    "uneven": NamedRoad(_uneven, "level but uneven: class C of ISO 8608; acts on sprung cars only", random=True),
+    "banked": NamedRoad(lambda: Banked(0.05), "bank rises to 0.05 rad (left side higher) within 50 m"),
 }
-"""Roads by name; their numbers are ours, of the size that is usual."""
+"""Roads by name. Their numbers are our own choice and of usual size."""
 
 
 def from_specification(spec: Any) -> AbstractRoad:
-    """A road from its file's content: `jaxveh.io.RoadSpecification`, or anything with its fields."""
+    """A road from the content of its file: `spec` is a `jaxveh.io.RoadSpecification`, or anything with its fields."""
     distance = (0.0, 1.0) if spec.distance is None else spec.distance
     table = lambda value: jax.numpy.asarray(value, float)
     return Profile(
@@ -62,7 +62,7 @@ def named_road(name: str | os.PathLike, key: jax.Array | None = None) -> Abstrac
 
     `key` draws a random road ("hills", "uneven"; default `jax.random.key(0)`).
 
-    **Raises** `InputError` for another name (listing those there are), or a file that is no road.
+    **Raises** `InputError` for an unknown name (it lists the known ones), or a file that does not describe a road.
     """
     if str(name) in ROADS:
         road = ROADS[str(name)]

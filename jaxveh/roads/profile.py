@@ -16,17 +16,17 @@ from jaxveh.numerics import interpolate_linear, interpolate_smooth
 from jaxveh.roads.base import AbstractRoad, Surface, place, surface
 
 INTERPOLATIONS = {"smooth": interpolate_smooth, "linear": interpolate_linear}
-"""How values between the points are made: monotone cubics, or straight lines."""
+"""How values between the points are interpolated: by monotone cubics or by straight lines."""
 
 
 class Profile(AbstractRoad):
-    """A road whose friction, grade and bank are tables over distance, held before the first and after the last point.
+    """A road whose friction, grade and bank are tables over distance, constant before the first and after the last point.
 
-    `distance` (m): (n,), rising, n >= 2. `friction` (-), `grade`, `bank` (rad): (n,) each, or one number for all the
-    way. `interpolation`: "smooth" (cubics that never leave the range of their two points, continuous slopes) or
-    "linear".
+    `distance` (m): (n,), strictly increasing, n >= 2. `friction` (-), `grade`, `bank` (rad): (n,) each, or one number for
+    the whole road. `interpolation`: "smooth" (cubics with continuous slopes that stay within the range of their two points)
+    or "linear".
 
-    **Raises** `InputError` for distances that do not rise, tables of another length, or values out of range.
+    **Raises** `InputError` for distances that do not increase, tables of another length, or values out of range.
     """
 
     distance: jax.Array = table("m", scale=1.0)

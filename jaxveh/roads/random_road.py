@@ -1,4 +1,4 @@
-"""Roads whose grade, bank and friction vary at random along the way, with a stated spectrum."""
+"""Roads whose grade, bank and friction vary at random with distance, with a given spectrum."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from jaxveh.roads.base import AbstractRoad, Surface, place, surface
 
 
 class Variation(eqx.Module):
-    """A random function of distance: harmonics of equal energy, `std` times a sum of variance 1.
+    """A random function of distance: `std` times a sum of harmonics of equal energy with variance 1.
 
     `std`: its standard deviation (rad, or - for friction). `wavenumbers` (1/m) and `phases` (rad): (n,) each, drawn by
     `gauss_markov` or `band`.
@@ -32,7 +32,7 @@ class Variation(eqx.Module):
         if np.ndim(self.wavenumbers) != 1 or np.shape(self.wavenumbers) != np.shape(self.phases):
             raise InputError(
                 f"Variation: wavenumbers have the shape {np.shape(self.wavenumbers)}, phases {np.shape(self.phases)}: "
-                "must be (n,) both."
+                "both must be (n,)."
             )
 
     def value(self, s: jax.Array) -> jax.Array:
@@ -44,8 +44,8 @@ def gauss_markov(std, length: float, key: jax.Array, *, shortest: float | None =
     """A variation with the autocorrelation `std^2 exp(-|lag| / length)`: a first-order Gauss-Markov process.
 
     Its one-sided spectral density over the wavenumber n (1/m) is `4 std^2 L / (1 + (2 pi n L)^2)`, with L the
-    correlation `length` (m); wavelengths below the `shortest` (m, default length / 5) are left out, so that it has
-    slopes, and the rest scaled to `std`. `count` harmonics; one `key` gives one function.
+    correlation `length` (m). Wavelengths below the `shortest` (m, default length / 5) are left out, so that the function is
+    differentiable, and the rest is scaled to `std`. `count` is the number of harmonics; each `key` gives one function.
 
     **Raises** `InputError` for values that are not positive.
     """
@@ -62,7 +62,7 @@ def band(std, longest: float, shortest: float, key: jax.Array, *, count: int = 1
 
     Its one-sided spectral density over the wavenumber is constant between `1 / longest` and `1 / shortest`.
 
-    **Raises** `InputError` for values that are not positive, or a longest wavelength that is not the longer one.
+    **Raises** `InputError` for values that are not positive, or a `longest` that is not above `shortest`.
     """
     check_positive("std", std)
     check_positive("shortest", shortest, "m")
@@ -72,12 +72,12 @@ def band(std, longest: float, shortest: float, key: jax.Array, *, count: int = 1
 
 
 class RandomRoad(AbstractRoad):
-    """A road whose grade, bank and friction vary at random along the way.
+    """A road whose grade, bank and friction vary at random with distance.
 
-    `grade`, `bank`: variations about zero (rad), or None for none. `friction` (-, default 1): its median, and
+    `grade`, `bank`: variations about zero (rad), or None for none. `friction` (-, default 1): the median friction.
     `log_friction`: the variation of its logarithm, or None for none (friction stays positive).
 
-    **Raises** `InputError` for a friction that is not positive, or a variation that is none.
+    **Raises** `InputError` for a friction that is not positive, or a part that is not a `Variation`.
     """
 
     grade: Variation | None = None
@@ -103,7 +103,7 @@ class RandomRoad(AbstractRoad):
 
 
 def _angle(value: jax.Array) -> jax.Array:
-    """Within a quarter turn, however far a sum of harmonics strays; 0.1 rad loses one part in 700."""
+    """An angle within a quarter turn, however large the sum of harmonics is; 0.1 rad is reduced by one part in 700."""
     return (math.pi / 2) * jnp.tanh(value * (2 / math.pi))
 
 

@@ -1,4 +1,4 @@
-"""Uneven roads by the spectrum of ISO 8608, whose left and right tracks go together over long waves and not over short ones."""
+"""Uneven roads with the spectrum of ISO 8608, whose left and right tracks are coherent in long waves and not in short ones."""
 
 from __future__ import annotations
 
@@ -15,22 +15,23 @@ from jaxveh._core.parameter import check_parameters, positive, table
 from jaxveh.roads.base import AbstractRoad, Surface, place, surface
 
 ROUGHNESS = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6, "E": 4096e-6}
-"""Classes of ISO 8608:2016 (A is very good, E very poor) and the geometric mean of their displacement density at 0.1 1/m, m^3."""
+"""Classes of ISO 8608:2016 (A is very good, E very poor), each with the geometric mean of its displacement spectral density at
+0.1 1/m, m^3."""
 
 REFERENCE = 0.1
-"""1/m: the wavenumber of that density, which goes with the wavenumber's power -2."""
+"""1/m: the reference wavenumber of that density, which is proportional to the wavenumber's power -2."""
 
 LONGEST = 90.0
-"""m: of the waves in ISO 8608's range; longer ones are hills."""
+"""m: the longest wave in the range of ISO 8608. Longer waves are hills."""
 
 
 class Rough(AbstractRoad):
-    """A road whose height over its plane is a sum of waves that run across each other; made by `rough`.
+    """A road whose height over its plane is a sum of waves in different directions; made by `rough`.
 
     `heights` (m), `wavenumbers` (1/m, along the road), `phases` (rad) and `slants` (-): (n,) each. A wave of slant q has the
-    height `h sin(2 pi n (s + q y) + phase)`, so that along any track the spectrum is the same. `friction` (-, default 1).
+    height `h sin(2 pi n (s + q y) + phase)`, so that the spectrum is the same along any track. `friction` (-, default 1).
 
-    **Raises** `InputError` for waves of different number, or a friction that is not positive.
+    **Raises** `InputError` for arrays of different length, or a friction that is not positive.
     """
 
     heights: jax.Array = table("m", scale=0.001)
@@ -44,7 +45,7 @@ class Rough(AbstractRoad):
         shapes = {np.shape(one) for one in (self.heights, self.wavenumbers, self.phases, self.slants)}
         if len(shapes) > 1 or len(next(iter(shapes))) != 1:
             raise InputError(
-                f"Rough: heights, wavenumbers, phases and slants have the shapes {shapes}: must be (n,) all."
+                f"Rough: heights, wavenumbers, phases and slants have the shapes {shapes}: all must be (n,)."
             )
 
     def at(self, s: Any, y: Any = 0.0) -> Surface:
@@ -52,7 +53,7 @@ class Rough(AbstractRoad):
         return surface(s, y, self.friction, height=self._height(s, y) - self._height(*place(0.0, 0.0, self.friction)))
 
     def _height(self, s: jax.Array, y: jax.Array) -> jax.Array:
-        """Not yet measured from the origin, where a car begins on its springs at rest."""
+        """The sum of the waves. `at` subtracts its value at the origin, where a car starts with its springs at rest."""
         along = s[..., None] + self.slants * y[..., None]
         return jnp.sum(self.heights * numerics.sin(2 * jnp.pi * self.wavenumbers * along + self.phases), axis=-1)
 
@@ -66,13 +67,14 @@ def rough(
     slant: float = 0.6,
     friction: Any = 1.0,
 ) -> Rough:
-    """A road of a class of ISO 8608 (`"A"` to `"E"`), or of a displacement density at 0.1 1/m (m^3); one `key`, one road.
+    """A road with the `roughness` of a class of ISO 8608 (`"A"` to `"E"`) or of a displacement spectral density at 0.1 1/m (m^3).
 
-    Along the road the one-sided density of its height is `roughness (n / 0.1)^-2` from `LONGEST` down to the `shortest` wave
-    (m; tyres smooth out what is shorter than their contact). The waves' slants are Cauchy's with the scale `slant`, which makes
-    the coherence of two tracks that are w apart `exp(-2 pi slant n w)`, the exponential law that is usual for parallel tracks;
-    the scale's default is ours: tracks 1.5 m apart are alike to a half in waves of 8 m. `count` waves, evenly drawn over the
-    wavenumber's logarithm; slants beyond 19 times the scale are left out.
+    Each `key` gives one road. Along the road the one-sided density of its height is `roughness (n / 0.1)^-2` from `LONGEST`
+    down to the `shortest` wave (m; tyres smooth out waves shorter than their contact). The slants have a Cauchy distribution
+    with the scale `slant`. The coherence of two tracks at the distance w is then `exp(-2 pi slant n w)`, the usual exponential
+    law for parallel tracks. The default of the scale is our own choice: tracks 1.5 m apart have the coherence 1/2 in waves of
+    8 m. `count` is the number of waves, drawn evenly over the logarithm of the wavenumber. Slants beyond 32 times the scale do
+    not occur. `friction` (-, that of the road).
 
     **Raises** `InputError` for an unknown class, or values out of range.
     """
@@ -89,7 +91,8 @@ def rough(
     shares = jax.random.uniform(shares, (count,))
     steps = (jnp.arange(count, dtype=shares.dtype) + shares) * width
     wavenumbers = jnp.exp(steps) / LONGEST
-    # A wave of height h has h^2 / 2 of variance; that of its share of the logarithm is density(n) n width.
+    # A wave of height h has the variance h^2 / 2. The spectrum has the variance density(n) n width in the wave's share of the
+    # logarithm of n.
     heights = jnp.sqrt(2 * roughness * REFERENCE**2 / wavenumbers * width)
     phases = 2 * jnp.pi * jax.random.uniform(turns, (count,))
     slants = slant * jnp.tan(jnp.pi * (jax.random.uniform(ways, (count,), minval=0.01, maxval=0.99) - 0.5))

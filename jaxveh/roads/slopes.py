@@ -1,4 +1,4 @@
-"""Roads with a shape: a hill, a bank."""
+"""Roads with slopes: a hill and a banked road."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from jaxveh.roads.base import AbstractRoad, Surface, place, surface
 class Hill(AbstractRoad):
     """A road that climbs by `height`, runs level over the crest and comes down again, with a continuous curvature.
 
-    `height` (m; negative: a dip), `start` (m): where it begins, `rise`, `crest`, `fall` (m): how long its parts are (a
-    crest of 0 is a round one), `friction` (-, default 1). The height is a smooth step up and another down; the grade is
-    steepest in the middle of either, with a slope of 1.875 height / length.
+    `height` (m; negative: a dip), `start` (m): where it begins, `rise`, `crest`, `fall` (m): the lengths of its parts (with
+    a crest of 0 the fall follows the rise at once), `friction` (-, default 1). The elevation is a smooth step up and a smooth
+    step down. The grade is steepest in the middle of each, with a slope of 1.875 height / length.
 
     **Raises** `InputError` for a length or a friction out of range.
     """
@@ -35,7 +35,7 @@ class Hill(AbstractRoad):
         check("Hill.crest", self.crest, lambda v: v >= 0, "at least 0 m")
 
     def elevation(self, s: Any) -> jax.Array:
-        """The height above the start, m, at a distance (m)."""
+        """The height above the start, m, at the distance `s` (m)."""
         up, down = self._parts(s)
         return self.height * (smooth_step(up) - smooth_step(down))
 
@@ -51,9 +51,9 @@ class Hill(AbstractRoad):
 
 
 class Banked(AbstractRoad):
-    """A road that tilts smoothly from level to a `bank` (rad, left side higher) and stays there.
+    """A road that tilts smoothly from level to a `bank` (rad, left side higher) and keeps it.
 
-    `start` (m, default 0): where it begins to tilt; `ramp` (m, default 50): how long that takes; `friction` (-).
+    `start` (m, default 0): where it begins to tilt; `ramp` (m, default 50): the length of the transition; `friction` (-).
 
     **Raises** `InputError` for a bank beyond a quarter turn, or a ramp or friction that is not positive.
     """

@@ -1,4 +1,4 @@
-"""Force laws of one wheel (or one axle) at one instant: contact in, forces out."""
+"""Tyre laws: the forces of one wheel (or one axle) at one instant as a function of its contact with the road."""
 
 from jaxveh.tyres import kit, mf_tyre
 from jaxveh.tyres.arctangent import Arctangent

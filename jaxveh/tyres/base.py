@@ -1,4 +1,4 @@
-"""The one contract of a tyre: how it touches the road goes in, forces and moments come out."""
+"""The interface of all tyre laws: a law takes the contact with the road and returns forces and moments."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from jaxveh._core.parameter_table import WithParameters
 
 
 class Contact(NamedTuple):
-    """How a tyre touches the road at one instant; scalars, or arrays that broadcast against each other.
+    """The contact of a tyre with the road at one instant: scalars, or arrays that broadcast against each other.
 
     - `slip_angle` (rad): positive gives positive lateral force, `-atan2(v_yw, |v_xw|)` in the wheel's axes.
     - `slip_ratio` (-): positive when driving, `(omega r_e - v_xw) / |v_xw|`.
-    - `load` (N): normal force, positive; None where it is not known (laws that need it raise). A negative load is a
-      wheel off the ground.
+    - `load` (N): normal force, positive; None if unknown (laws that need it raise an error). A negative load means that the
+      wheel is off the ground.
     - `camber` (rad): inclination about the wheel's x axis (x forward, y left, z up).
     - `friction` (-): the road's friction over that of the road on which the tyre's parameters hold.
-    - `speed` (m/s): forward speed |v_xw| of the contact point; None where it is not known (laws that need it raise, or take
-      their nominal one, as they say).
+    - `speed` (m/s): forward speed |v_xw| of the contact point; None if unknown (laws that need it raise an error or use their
+      nominal speed, as each law documents).
     - `pressure` (Pa): inflation pressure; None means the tyre's own.
     - `turn_slip` (1/m): curvature of the contact point's path as far as the wheel turns with it, phi_t of the book (4.75) in
-      ISO-W's sign; laws without it ignore it.
-    - `lateral_slip` (-): tan(slip_angle), from whoever has it at hand, as a vehicle does: laws that want the tangent need no
-      trigonometry then. None: they take it themselves. Who replaces a slip angle replaces this too.
-    - `slip_speed` (m/s): what the slips are relative to, so that `slip_ratio` and tan(slip_angle) times it are the speeds with
-      which the contact point slides, at standstill too. Vehicles regularise their slips at low speed and say by what; None: by
-      the speed itself.
-    - `direction` (-): 1 where the wheel travels forwards, -1 backwards, and smooth between in a vehicle. The pneumatic trail lies
-      behind the wheel's centre as seen in this direction; laws of an aligning moment multiply it by this, sgn V_cx of the book.
-      All else of a law is that of travelling forwards, rolling resistance too, whose sign vehicles reverse themselves.
+      ISO-W's sign; laws without turn slip ignore it.
+    - `lateral_slip` (-): tan(slip_angle), if the caller has it already, as vehicles do; laws that use the tangent then need no
+      trigonometry. None: they compute it. Code that replaces the slip angle must replace this field too.
+    - `slip_speed` (m/s): the speed to which the slips are relative: `slip_ratio` and tan(slip_angle) times it are the sliding
+      speeds of the contact point, at standstill too. Vehicles, which regularise their slips at low speed, set it. None: the
+      slips are relative to the speed itself.
+    - `direction` (-): 1 if the wheel travels forwards, -1 backwards, with a smooth transition in a vehicle. The pneumatic trail
+      lies behind the wheel's centre as seen in this direction. Laws with an aligning moment multiply it by this value, sgn V_cx
+      of the book. The rest of a law is that of forward travel. This includes rolling resistance, whose sign the vehicle reverses.
     """
 
     slip_angle: Any = 0.0
@@ -52,10 +52,10 @@ class Contact(NamedTuple):
 
 
 class Forces(NamedTuple):
-    """What the road does to a tyre, in the wheel's axes (x forward, y left, z up): forces in N, moments in N m.
+    """The forces (N) and moments (N m) of the road on a tyre, in the wheel's axes (x forward, y left, z up).
 
-    Fields broadcast against each other; what a law does not have is the Python number 0.0. `M_x` is the overturning,
-    `M_y` the rolling resistance, `M_z` the aligning moment.
+    Fields broadcast against each other. Components that a law does not model are the Python number 0.0. `M_x` is the
+    overturning, `M_y` the rolling resistance, `M_z` the aligning moment.
     """
 
     F_x: Any = 0.0
@@ -66,7 +66,7 @@ class Forces(NamedTuple):
 
 
 class AbstractTyre(WithParameters, eqx.Module):
-    """A tyre (or an axle's tyres together): an elementwise force law, its array leaves are its parameters.
+    """A tyre, or the tyres of an axle together: an elementwise force law whose array leaves are its parameters.
 
     **Raises** `InputError` for parameters outside their domain.
     """
@@ -79,20 +79,20 @@ class AbstractTyre(WithParameters, eqx.Module):
 
     @abc.abstractmethod
     def forces(self, contact: Contact, state: Any = None) -> Forces:
-        """Forces and moments at a contact; `state` is None except for a tyre with states of its own."""
+        """The forces and moments at a contact; `state` is None except for a tyre with states of its own."""
 
 
 class AbstractDynamicTyre(AbstractTyre):
-    """A tyre with states of its own (relaxation, bristles); a vehicle carries them among its states.
+    """A tyre with states of its own (relaxation, bristles). A vehicle with such tyres includes them in its own state.
 
-    `forces(contact, state)` then needs the state, a NamedTuple of scalars with the fields `state_names`.
+    `forces(contact, state)` needs the tyre's state, a NamedTuple of scalars with the fields `state_names`.
     """
 
     state_names: eqx.AbstractVar[tuple[str, ...]]
 
     @abc.abstractmethod
     def start(self, contact: Contact) -> Any:
-        """The state that has settled at a constant contact."""
+        """The steady state at a constant contact."""
 
     @abc.abstractmethod
     def derivatives(self, contact: Contact, state: Any) -> Any:
@@ -100,26 +100,26 @@ class AbstractDynamicTyre(AbstractTyre):
 
 
 def need_load(contact: Contact, tyre: str):
-    """The load, zero where the wheel is off the ground; raises `InputError` where the contact does not say."""
+    """The load, zero where the wheel is off the ground. Raises `InputError` if the contact has no load."""
     if contact.load is None:
         raise InputError(f"contact.load = None: {tyre} scales with load; give the wheel's (or axle's) load in N.")
     return jnp.maximum(contact.load, 0.0)
 
 
 def need_speed(contact: Contact, tyre: str):
-    """The speed; raises `InputError` where the contact does not say."""
+    """The speed. Raises `InputError` if the contact has no speed."""
     if contact.speed is None:
         raise InputError(f"contact.speed = None: {tyre} needs the wheel's forward speed in m/s.")
     return contact.speed
 
 
 def need_slip_speed(contact: Contact, tyre: str):
-    """What the slips are relative to; raises `InputError` where the contact does not say."""
+    """The speed to which the slips are relative. Raises `InputError` if the contact has no speed."""
     return need_speed(contact, tyre) if contact.slip_speed is None else contact.slip_speed
 
 
 def need_static(name: str, tyre) -> None:
-    """Raise `InputError` unless `tyre` is a tyre without states, which is what a wrapper can wrap."""
+    """Raise `InputError` unless `tyre` is a tyre without states; wrappers accept only such tyres."""
     if not isinstance(tyre, AbstractTyre):
         raise InputError(f"{name} = {type(tyre).__name__}: must be a tyre of jaxveh.tyres.")
     if isinstance(tyre, AbstractDynamicTyre):
@@ -127,7 +127,7 @@ def need_static(name: str, tyre) -> None:
 
 
 def cornering_stiffness(tyre: AbstractTyre, contact: Contact) -> jax.Array:
-    """Slope of the lateral force over slip angle, N/rad, at a contact of scalars; any tyre without states.
+    """The slope of the lateral force over slip angle, N/rad, at a contact of scalars, for any tyre without states.
 
     At zero slip it is the cornering stiffness of the book.
     """

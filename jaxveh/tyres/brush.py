@@ -1,4 +1,4 @@
-"""The brush tyre: bristles that stick until the parabolic pressure cannot hold them."""
+"""The brush tyre: bristles that stick up to the friction limit of a parabolic pressure distribution."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ class Brush(AbstractTwoStiffnesses):
     """The brush model with parabolic pressure, combined slip (H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed., sec. 3.2).
 
     `slip_stiffness` (N) and `cornering_stiffness` (N/rad) at small slip, `friction` (-), `half_length` (m) of the contact.
-    With theoretical slips sigma and `g = |C sigma| / (3 mu F_z)` bristles stick along the first `1 - g` of the contact and
-    slide behind; from g = 1 on all slide.
+    With theoretical slips sigma and `g = |C sigma| / (3 mu F_z)` bristles stick in the leading part `1 - g` of the contact and
+    slide behind it. From g = 1 on all slide.
 
-    `slides` says where to, which is the same question as long as both stiffnesses are equal:
+    `slides`: the direction of the force of a sliding bristle. Both choices are the same if the two stiffnesses are equal:
 
-    - `along deflection` (the default): a sliding bristle goes on in the direction in which it was deflected, `C sigma`. The force
+    - `along deflection` (the default): the force keeps the direction in which the bristle was deflected, `C sigma`. The force
       is `mu F_z (1 - (1 - g)^3)` in that direction, and the trail `a / 3 (1 - g)^3 / (1 - g + g^2 / 3)`.
     - `against velocity`: friction on a sliding bristle points against its velocity, along sigma. The force is
-      `(1 - g)^2 C sigma + mu F_z g^2 (3 - 2 g) sigma / |sigma|`, and the aligning moment the sum of both parts' about the
+      `(1 - g)^2 C sigma + mu F_z g^2 (3 - 2 g) sigma / |sigma|`. The aligning moment is that of both parts about the
       contact's centre, `-a (1 - g)^2 ((4 (1 - g) / 3 - 1) C_y sigma_y + 3 mu F_z g^2 sigma_y / |sigma|)`. At full sliding this
       is Coulomb's law. J. Svendenius, Tire Modeling and Friction Estimation (thesis, Lund, 2007), compares both.
 
-    The forms' forces differ in each direction by up to 11 % of `mu F_z` where one stiffness is 4/3 of the other, by 26 % at
-    twice: most at full sliding.
+    The forces of the two choices differ in each direction by up to 11 % of `mu F_z` if one stiffness is 4/3 of the other, and
+    by up to 26 % if it is twice the other. The difference is largest at full sliding.
 
     **Raises** `InputError` for parameters that are not positive, an unknown `slides`, or a contact without a load.
     """

@@ -1,4 +1,4 @@
-"""Dugoff's tyre: constant pressure, one friction coefficient, forces of both directions in a few lines."""
+"""Dugoff's tyre: combined slip with uniform pressure and one friction coefficient."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
 
 
 class Dugoff(AbstractTwoStiffnesses):
-    """The model of Dugoff, Fancher & Segel (SAE 700377, 1970), in slip ratios that are positive when driving.
+    """The model of Dugoff, Fancher & Segel (SAE 700377, 1970), with slip ratios that are positive when driving.
 
-    `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-), `fading` (s/m; default 0) by which friction falls with
-    sliding speed, `mu (1 - fading V |slip|)`. With theoretical slips sigma and `l = mu F_z / (2 |C sigma|)` forces are
-    `C sigma l (2 - l)` where l < 1, else `C sigma`.
+    `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-), `fading` (s/m; default 0): friction falls with sliding
+    speed as `mu (1 - fading V |slip|)`. With theoretical slips sigma and `l = mu F_z / (2 |C sigma|)` the forces are
+    `C sigma l (2 - l)` where l < 1, and `C sigma` otherwise.
 
     **Raises** `InputError` for parameters out of range, or a contact without a load (with `fading`: without a speed).
     """
@@ -44,7 +44,7 @@ class Dugoff(AbstractTwoStiffnesses):
         return Forces(F_x=share * wish_x, F_y=share * wish_y)
 
     def _friction_share(self, contact: Contact, like):
-        """The share of friction that is left at the sliding speed."""
+        """The share of friction that remains at the sliding speed."""
         if contact.speed is None:
             raise InputError("contact.speed = None: Dugoff with fading needs the wheel's speed in m/s.")
         tangent = numerics.tan(contact.slip_angle * jnp.ones_like(like))

@@ -1,4 +1,4 @@
-"""Rows of a table through an MF-Tyre, by the column names of the reference evaluator."""
+"""Evaluation of an MF-Tyre for the rows of a table, with the column names of the reference evaluator."""
 
 from __future__ import annotations
 
@@ -22,24 +22,26 @@ EVALUATION_INPUTS = {
     "Vx": ("in_Vx", "Vx", "speed"),
     "P": ("in_P", "P", "pressure"),
 }
-"""Names under which a table may hold an input: load (N), slip ratio, slip angle, camber (rad), turn slip (1/m), speed (m/s),
-pressure (Pa). The load is needed; others are zero, speed LONGVL and pressure INFLPRES, where the table has none."""
+"""The column names that a table may use for each input: load (N), slip ratio, slip angle, camber (rad), turn slip (1/m),
+speed (m/s), pressure (Pa). The load is required. An input without a column is LONGVL for the speed, INFLPRES for the pressure
+and zero for the others."""
 
 OUTPUTS = {
     "Re": "R_e", "rho": "rho", "t": "trail", "mux": "mu_x", "muy": "mu_y", "omega": "omega", "Rl": "R_l", "Mzr": "M_zr",
     "Cx": "C_x", "Cy": "C_y", "Cz": "C_z", "sigmax": "sigma_x", "sigmay": "sigma_y", "Kxk": "K_xk",
 }  # fmt: skip
-"""Outputs whose sign is the same in both axes, by the reference's names; see `MFOutputs`."""
+"""The outputs with the same sign in both axis systems: the reference's name for each field of `MFOutputs`."""
 
 AXES = ("iso-w", "ours")
 
 
 def evaluate(tyre: MFTyre, columns: Mapping[str, np.ndarray], *, axes: str = "iso-w") -> dict[str, np.ndarray]:
-    """Forces, moments and internals of each row, by the names of the reference evaluator.
+    """Forces, moments and internal quantities of each row, by the names of the reference evaluator.
 
-    `columns`: arrays of equal length by the names of `EVALUATION_INPUTS`; `useMode`, where present, chooses row by row: hundreds
-    digit 1 limits, 2 none; tens 1 angles, 2 their tangent and sine; units 1 without, 2 with turn slip. `axes`: `iso-w`, where a
-    positive slip angle gives a negative force, or `ours`, where it gives a positive one (then K_ya is positive, too).
+    `columns`: arrays of equal length by the names of `EVALUATION_INPUTS`. A column `useMode` chooses the options of each row:
+    hundreds digit 1 with limits, 2 without; tens digit 1 angles, 2 their tangent and sine; units digit 1 without turn slip, 2
+    with it. `axes`: `iso-w`, where a positive slip angle gives a negative force, or `ours`, where it gives a positive force
+    (K_ya is then positive too).
 
     **Raises** `InputError` for a table without a load, an unknown mode or negative speeds.
     """
@@ -53,13 +55,13 @@ def evaluate(tyre: MFTyre, columns: Mapping[str, np.ndarray], *, axes: str = "is
     for name, value in given.items():
         if value is not None and len(value) != rows:
             raise InputError(
-                f"{EVALUATION_INPUTS[name][0]}: {len(value)} rows, {EVALUATION_INPUTS['Fz'][0]} has {rows}; must be as many."
+                f"{EVALUATION_INPUTS[name][0]}: {len(value)} rows, {EVALUATION_INPUTS['Fz'][0]} has {rows}; must be equal."
             )
     _refuse(given["Vx"], lambda x: x < 0, "speed", "must be at least 0: turn the wheel's axes instead")
     filled = {name: np.zeros(rows) if value is None else value for name, value in given.items()}
     if given["Vx"] is None:
         filled["Vx"] = np.full(rows, float(tyre.structure.LONGVL))
-    # A pressure of zero means the file's own, as in the reference.
+    # As in the reference, a pressure of zero means the file's pressure.
     own = float(tyre.structure.INFLPRES)
     filled["P"] = np.where(filled["P"] == 0, own, filled["P"])
     modes = _column(columns, ("useMode",))
@@ -95,7 +97,7 @@ def _outputs(tyre: MFTyre, contact: Contact):
 
 
 def _column(columns: Mapping[str, np.ndarray], names: tuple[str, ...]) -> np.ndarray | None:
-    """The first of the names that the table holds, as floats."""
+    """The column of the first of the names that the table has, as floats; None if it has none of them."""
     for name in names:
         if name in columns:
             values = np.asarray(columns[name], dtype=float)

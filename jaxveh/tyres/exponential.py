@@ -1,4 +1,4 @@
-"""The exponential tyre: friction reached by one decay in slip angle."""
+"""The exponential tyre: the lateral force approaches the friction limit exponentially in slip angle."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ class Exponential(AbstractTyre):
     """`F_y = mu_s F_z (1 - exp(-k |alpha|)) sgn(alpha)` with `mu_s = sqrt(mu^2 - (F_x / F_z)^2)`.
 
     J. Zuurbier & P. Bremmer, AVEC 2002 (the review's [32] says 2000); eq. 6 of the sideslip review (Chen, Gao & Xu, 2013;
-    erratum: `k` is in 1/rad, no stiffness in N/rad).
+    erratum: `k` is in 1/rad, not a stiffness in N/rad).
 
     - `stiffness_factor` (1/rad): k, cornering stiffness over `mu F_z`.
     - `friction` (-): mu.
-    - `slip_stiffness_factor` (-): of the same law in slip ratio, `F_x = mu F_z (1 - exp(-k_x |kappa|)) sgn(kappa)`; None for no
-      longitudinal force. The source takes F_x as known: this is our choice, with which the total stays within `mu F_z`.
+    - `slip_stiffness_factor` (-): k_x of the same law in slip ratio, `F_x = mu F_z (1 - exp(-k_x |kappa|)) sgn(kappa)`; None
+      for no longitudinal force. The source takes F_x as known. This law is our own choice; with it the total force stays within
+      `mu F_z`.
 
     **Raises** `InputError` for parameters that are not positive, or a contact without a load.
     """
@@ -37,7 +38,7 @@ class Exponential(AbstractTyre):
         if self.slip_stiffness_factor is None:
             return Forces(F_y=F_y)
         x = self.slip_stiffness_factor * contact.slip_ratio
-        # sqrt(1 - (F_x / limit)^2), in a form without infinite slope where F_x takes all.
+        # sqrt(1 - (F_x / limit)^2), in a form without infinite slope where F_x uses all of the friction.
         decay = jnp.exp(-jnp.abs(x) / 2)
         left = decay * numerics.sqrt(2 - decay**2)
         return Forces(F_x=limit * _rise(x), F_y=left * F_y)

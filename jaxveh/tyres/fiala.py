@@ -1,4 +1,4 @@
-"""Fiala's tyre: lateral force as a cubic of the slip angle's tangent, longitudinal force taking its share of friction."""
+"""Fiala's tyre: the lateral force is a cubic of the slip angle's tangent, within the friction that F_x leaves."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from jaxveh.tyres.base import Contact, Forces
 from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
 
 LEAST_SHARE = 0.01
-"""The square of the share of friction that is left sideways however large the longitudinal force."""
+"""The square of the least share of friction that remains for the lateral force, however large the longitudinal force is."""
 
 
 class Fiala(AbstractTwoStiffnesses):
     """Fiala (1954) with longitudinal coupling (Hindiyeh & Gerdes, J. Dyn. Sys. Meas. Control 136, 2014, eqs 3 to 6).
 
     `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-), `half_length` (m). `F_x = C_x kappa` within
-    `+- mu F_z`; what is left, `f = sqrt((mu F_z)^2 - F_x^2)` but no less than a tenth of `mu F_z`, bounds
-    `F_y = f (q - q^2 / 3 + q^3 / 27)`, with `q = C tan(alpha) / f` up to q = 3, f beyond. Without F_x this is the form of
-    ADAMS (erratum: the model-adaptive paper prints coefficients of an interpolation instead). `M_z` is the brush model's.
+    `+- mu F_z`. The remaining friction `f = sqrt((mu F_z)^2 - F_x^2)`, at least a tenth of `mu F_z`, bounds the lateral force:
+    `F_y = f (q - q^2 / 3 + q^3 / 27)` with `q = C tan(alpha) / f` up to q = 3, and f beyond. Without F_x this is the form of
+    ADAMS (erratum: the model-adaptive paper prints coefficients of an interpolation instead). `M_z` is that of the brush model.
 
     **Raises** `InputError` for parameters that are not positive, or a contact without a load.
     """

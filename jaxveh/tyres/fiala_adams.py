@@ -1,4 +1,4 @@
-"""Fiala's tyre as ADAMS computes it: each direction by itself, under a friction that falls with the slip of both."""
+"""Fiala's tyre as in ADAMS: both directions are independent, and friction falls with the total slip."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
 class FialaADAMS(AbstractTwoStiffnesses):
     """The Fiala model of MSC ADAMS (Adams Tire, Using the Fiala Handling Force Model), in this package's signs.
 
-    `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-; UMAX) at rest, `sliding_friction` (-; UMIN) at the slip 1,
-    None for a friction that stays; `half_width` (m; R_2 of the carcass), which scales the aligning moment.
+    `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-; UMAX, at zero slip), `sliding_friction` (-; UMIN, at the
+    slip 1, None for constant friction), `half_width` (m; R_2 of the carcass, which scales the aligning moment).
 
     With `S = sqrt(kappa^2 + tan(alpha)^2)`, at most 1, `mu = UMAX - (UMAX - UMIN) S`:
 
     - `F_x = C_x kappa` up to `|kappa| = mu F_z / (2 C_x)`, then `mu F_z - (mu F_z)^2 / (4 |kappa| C_x)` with kappa's sign.
-    - With `H = 1 - C |tan(alpha)| / (3 mu F_z)`, up to H = 0: `F_y = mu F_z (1 - H^3)`, `M_z = -2 R_2 mu F_z (1 - H) H^3`, with
-      alpha's sign; beyond, `mu F_z` and 0.
+    - With `H = 1 - C |tan(alpha)| / (3 mu F_z)`: `F_y = mu F_z (1 - H^3)` and `M_z = -2 R_2 mu F_z (1 - H) H^3`, with alpha's
+      sign, as long as H > 0; beyond that `mu F_z` and 0.
 
-    The directions do not take friction from each other: the total reaches `sqrt(2) mu F_z`. `Fiala` couples them.
+    The two directions do not share the friction: the total force reaches `sqrt(2) mu F_z`. `Fiala` couples them.
 
     **Raises** `InputError` for parameters that are not positive, or a contact without a load.
     """

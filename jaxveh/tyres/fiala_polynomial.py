@@ -1,4 +1,4 @@
-"""Fiala's tyre as the model-adaptive particle filter's paper prints it: polynomials fitted to the forces and the moment."""
+"""Fiala's tyre as printed in the paper of the model-adaptive particle filter: polynomials fitted to the forces and the moment."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
 FORCE = (1.0, -0.0668, -0.1032)
 MOMENT = (0.2749, -0.0950, -0.0872, 0.0353)
 PEAK = (FORCE[1] + math.sqrt(FORCE[1] ** 2 - 3 * FORCE[2])) / (-3 * FORCE[2])
-"""The normalised slip angle where the force's polynomial is greatest, 1.594."""
+"""The normalised slip angle at which the polynomial of the force is greatest, 1.594."""
 TAIL = 2.0
-"""The normalised slip angle from which on the moment falls as a hyperbola."""
+"""The normalised slip angle beyond which the moment falls as a hyperbola."""
 POLE = 0.32
 
 
@@ -27,19 +27,19 @@ class FialaPolynomial(AbstractTwoStiffnesses):
     """The Fiala tyre of Qin et al. (2014, a model-adaptive particle filter for vehicle states), eqs. 9 to 11.
 
     `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-), `trail` e (m) at zero slip, `contact_length` L_r (m;
-    None: `e / 0.2749`). With `theta = C tan(alpha) / (mu F_z)`, q its magnitude, and the signs of theta:
+    None: `e / 0.2749`). With `theta = C tan(alpha) / (mu F_z)`, its magnitude q, and the sign of theta:
 
     - `F_x = C_x kappa`, within `+- mu F_z`;
-    - `F_y = mu F_z (q - 0.0668 q^2 - 0.1032 q^3)` up to its peak at q = 1.594, then the peak's 1.0063 mu F_z;
+    - `F_y = mu F_z (q - 0.0668 q^2 - 0.1032 q^3)` up to its peak at q = 1.594, then constant at the peak's 1.0063 mu F_z;
     - `M_z = -mu F_z L_r (0.2749 q - 0.0950 q^2 - 0.0872 q^3 + 0.0353 q^4)` up to q = 2, then falling as `1 / (q - 0.32)`.
 
-    `as_printed=True` is the paper to the letter but for its signs: F_x without limit, the branch of F_y at 1.54, where it
-    steps by 0.2 per cent, and beyond q = 2 the moment `0.2258 mu F_z e / (q - 0.32)`, to which it steps.
+    `as_printed=True` follows the paper to the letter except for its signs: F_x without limit; F_y with its branch at 1.54, where
+    it jumps by 0.2 per cent; and beyond q = 2 the moment `0.2258 mu F_z e / (q - 0.32)`, with a jump at q = 2.
 
-    Errata: the sign of eq. 10; |theta|; that step of the moment, 64 per cent with the printed L_r of 70 mm and e of 31.7 mm
-    (with `e / 0.2749`, 115 mm, it is 0.1 per cent and e the trail at zero slip; 70 mm is probably a misprint); the printed C_x
-    of 1200 N is unusably small. `Fiala` is the law of ADAMS for which these polynomials stand; they lie above it, by up
-    to 14 per cent of mu F_z at q = 1.3.
+    Errata: the sign of eq. 10; |theta|; the jump of the moment, which is 64 per cent with the printed L_r of 70 mm and e of
+    31.7 mm (with `e / 0.2749`, 115 mm, it is 0.1 per cent and e is the trail at zero slip, so 70 mm is probably a misprint);
+    the printed C_x of 1200 N is unusably small. These polynomials approximate the law of ADAMS, `Fiala`. They lie above it, by
+    up to 14 per cent of mu F_z at q = 1.3.
 
     **Raises** `InputError` for parameters that are not positive, or a contact without a load.
     """
@@ -76,7 +76,7 @@ class FialaPolynomial(AbstractTwoStiffnesses):
 
 
 def _clip_theta(wish, limit, branch: float):
-    """|theta|, at most `branch`, and whether it lies below."""
+    """|theta|, at most `branch`, and whether it lies below that."""
     held = limit > 0
     q = jnp.abs(wish) / jnp.where(held, limit, 1.0)
     below = (q < branch) & held

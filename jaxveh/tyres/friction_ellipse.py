@@ -1,4 +1,4 @@
-"""Two laws of pure slip combined: forces on an ellipse whose axes they are."""
+"""Combined slip from two laws of pure slip: the force lies on an ellipse whose half-axes are their forces."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from jaxveh.tyres.slip import length, practical, share
 class FrictionEllipse(AbstractTyre):
     """Combined slip from `along`, a law of F_x over slip ratio, and `across`, a law of F_y over slip angle.
 
-    Both laws see the whole slip `s = |(kappa, tan(alpha))|`, the sliding speed over the forward speed, and each force is its
-    direction's part, after Bakker, Nyborg & Pacejka (SAE 870421, 1987), here in practical slips:
+    Both laws are evaluated at the total slip `s = |(kappa, tan(alpha))|`, the sliding speed over the forward speed. Each force
+    is the share of its direction, after Bakker, Nyborg & Pacejka (SAE 870421, 1987), here in practical slips:
 
         F_x = kappa / s F_x0(s),    F_y = tan(alpha) / s F_y0(arctan(s))
 
-    so that `(F_x / F_x0)^2 + (F_y / F_y0)^2 = 1`: an ellipse that never leaves the one of the laws' peaks, slopes at zero slip
-    as in pure slip, and a locked wheel (kappa = -1) is pushed against its sliding, where `sqrt(1 - (F_x / F_max)^2)` is not.
-    With one slip zero the other law is left as it is. Where a slip is negative the law's negative side is taken; a force at
-    zero slip (shifts, camber) is kept whatever the slip, and may leave the ellipse by as much.
+    Then `(F_x / F_x0)^2 + (F_y / F_y0)^2 = 1`, an ellipse within that of the laws' peaks, and the slopes at zero slip are those
+    of pure slip. The force on a locked wheel (kappa = -1) opposes its sliding, which is not so with
+    `sqrt(1 - (F_x / F_max)^2)`. If one slip is zero, the other law is unchanged. Where a slip is negative, the negative side of
+    its law is used. A force at zero slip (shifts, camber) is kept at every slip, and the total may leave the ellipse by as much.
 
-    A law that has F_y alone stands along the wheel as `LongitudinalLaw(law)`. The contact's load, camber, friction, speed and
-    pressure reach both laws; moments are left out.
+    A law with F_y only can be used along the wheel as `LongitudinalLaw(law)`. Both laws get the contact's load, camber,
+    friction, speed and pressure. Moments are left out.
 
-    **Raises** `InputError` for a law that is no tyre, or has states.
+    **Raises** `InputError` for a law that is not a tyre or that has states.
     """
 
     along: AbstractTyre

@@ -1,4 +1,4 @@
-"""What those who add a tyre law, or read one, build with."""
+"""The building blocks for code that adds or reads tyre laws."""
 
 from jaxveh.tyres.base import need_load, need_static
 from jaxveh.tyres.evaluation import EVALUATION_INPUTS, evaluate

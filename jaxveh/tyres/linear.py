@@ -1,4 +1,4 @@
-"""The linear tyre: the baseline that every other law agrees with at small slip."""
+"""The linear tyre: the baseline with which every other law agrees at small slip."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from jaxveh.tyres.base import AbstractTyre, Contact, Forces
 
 
 class Linear(AbstractTyre):
-    """`F_y = cornering_stiffness * slip_angle` (N/rad), `F_x = slip_stiffness * slip_ratio` (N), both without limit.
+    """`F_y = cornering_stiffness * slip_angle` and `F_x = slip_stiffness * slip_ratio`, both without limit.
 
-    Load, friction and camber do not count. Without a slip stiffness (None) there is no longitudinal force.
+    `cornering_stiffness` (N/rad), `slip_stiffness` (N; None: no longitudinal force). Load, friction and camber have no effect.
 
     **Raises** `InputError` for stiffnesses that are not positive.
     """

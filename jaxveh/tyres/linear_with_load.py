@@ -1,4 +1,4 @@
-"""The linear tyre whose stiffness follows the load: what load transfer takes from an axle at small slip."""
+"""The linear tyre whose stiffness depends on the load: the effect of load transfer on an axle at small slip."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
 class LinearWithLoad(AbstractTyre):
     """`F_y = C(F_z) slip_angle` with the Magic Formula's `C = C_max sin(2 atan(F_z / F_peak))`.
 
-    H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed., eq. 4.E25 without camber and pressure. The stiffness is
-    `2 C_max / F_peak` times the load at first, greatest at `F_peak`, and falls beyond.
+    H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed., eq. 4.E25 without camber and pressure. At small load the stiffness is
+    `2 C_max / F_peak` times the load. It is greatest at `F_peak` and falls beyond.
 
-    - `cornering_stiffness` (N/rad): C_max, the greatest.
-    - `peak_load` (N): F_peak, the load where it is greatest.
+    - `cornering_stiffness` (N/rad): C_max, the greatest cornering stiffness.
+    - `peak_load` (N): F_peak, the load at which the stiffness is greatest.
     - `slip_stiffness_factor` (-): slip stiffness over load, `F_x = factor F_z slip_ratio` (eq. 4.E15 to first order); None for no
       longitudinal force.
 
-    Without limit: friction and camber do not count.
+    The forces have no limit; friction and camber have no effect.
 
     **Raises** `InputError` for parameters that are not positive, or a contact without a load.
     """

@@ -1,4 +1,4 @@
-"""The LuGre tyre: bristles whose mean deflection is the state, from standstill to full sliding."""
+"""The LuGre tyre: the mean deflection of its bristles is the state, valid from standstill to full sliding."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from jaxveh.tyres.base import AbstractDynamicTyre, Contact, Forces, need_load, n
 from jaxveh.tyres.slip import LOCKED, practical
 
 LEAST_FRICTION = 1e-3
-"""The least friction of the road that the bristles know; without it their deflection would have to vanish at once."""
+"""The least road friction used for the bristles; at zero friction their deflection would have to vanish at once."""
 
 _TERMS = 16
 _ABOVE = tuple((-1) ** n / math.factorial(n + 1) for n in range(_TERMS))
@@ -25,7 +25,7 @@ _BELOW = tuple(2 * (-1) ** n / math.factorial(n + 2) for n in range(_TERMS))
 
 
 class LuGreState(NamedTuple):
-    """Mean deflections of the bristles, m: positive like the forces they make."""
+    """The mean deflections of the bristles, m, with the sign of their forces."""
 
     z_x: Any
     z_y: Any
@@ -33,10 +33,10 @@ class LuGreState(NamedTuple):
 
 class LuGre(AbstractDynamicTyre):
     """The average lumped LuGre tyre for combined slip (Velenis, Tsiotras, Canudas-de-Wit & Sorine, Vehicle System Dynamics
-    43, 2005; longitudinal: Canudas-de-Wit, Tsiotras, Velenis, Basset & Gissinger, VSD 39, 2003), uniform pressure.
+    43, 2005; longitudinal: Canudas-de-Wit, Tsiotras, Velenis, Basset & Gissinger, VSD 39, 2003), with uniform pressure.
 
     With the sliding velocities v_rx = omega r - v_x and v_ry = -v_y, which are kappa and tan(alpha) times the contact's
-    `slip_speed` (|v|, where it is None), and the rolling speed |omega r| = |v_x + v_rx|, for each direction i:
+    `slip_speed` (|v| if it is None), and the rolling speed |omega r| = |v_x + v_rx|, for each direction i:
 
         dz_i/dt = v_ri - (c_i + kappa_i omega r) z_i,    c_i = sigma_0i |v_r| / g
         g       = mu_k + (mu_s - mu_k) exp(-(|v_r| / v_s)^gamma)
@@ -45,16 +45,17 @@ class LuGre(AbstractDynamicTyre):
     `stiffness_x`, `stiffness_y` (sigma_0, 1/m; the slip stiffness at zero slip is `F_z sigma_0 L / 2`), `static_friction` and
     `kinetic_friction` (mu_s, mu_k), `stribeck_speed` (v_s, m/s), `contact_length` (L, m), `damping_x`, `damping_y` (sigma_1,
     s/m, default 0), `viscous` (sigma_2, s/m, default 0), `exponent` (gamma, default 2). The road's friction multiplies g.
-    Friction is that of a circle (the paper's M_k and M_s are multiples of unity); no aligning moment, which needs a third state.
+    Friction is isotropic (the paper's M_k and M_s are multiples of the unit matrix). There is no aligning moment, which would
+    need a third state.
 
-    `kappa_i`, between 1 / L and 2 / L, makes the settled state that of the distributed bristles exactly: with
-    `p = c_i L / (omega r)` it is `(1 - e^-p) / (L (1 - (1 - e^-p) / p))`. Settled, without viscous friction, the force is
-    within `mu_s F_z`. At standstill bristles hold what they have and take up all sliding, up to friction's limit. The settled
-    state is that of the contact's slips; where nothing moves it is zero, of a contact without a `slip_speed` the limit of slow
-    rolling.
+    `kappa_i`, between 1 / L and 2 / L, makes the steady state exactly that of the distributed bristles: with
+    `p = c_i L / (omega r)` it is `(1 - e^-p) / (L (1 - (1 - e^-p) / p))`. In the steady state, without viscous friction, the
+    force is within `mu_s F_z`. At standstill the bristles keep their deflection and take up all sliding, up to the friction
+    limit. `start` gives the steady state at the contact's slips. If nothing moves, it is zero; for a contact without a
+    `slip_speed` it is the limit of slow rolling.
 
-    The poles are `-(c_i + kappa_i omega r)`, fast in sliding: RK4 needs steps below `2.78 / (sigma_0 |v_r| / g + 2 omega r / L)`,
-    at 1 ms with sigma_0 = 180, g = 0.8: sliding speeds below 9 m/s at 60 m/s with L = 0.2 m.
+    The poles `-(c_i + kappa_i omega r)` are fast in sliding: RK4 needs steps below `2.78 / (sigma_0 |v_r| / g + 2 omega r / L)`.
+    With steps of 1 ms, sigma_0 = 180, g = 0.8 and L = 0.2 m the sliding speed at 60 m/s must be below 9 m/s.
 
     **Raises** `InputError` for parameters out of range, or a contact without a load or speed.
     """
@@ -90,7 +91,7 @@ class LuGre(AbstractDynamicTyre):
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_x and F_y, N."""
         if state is None:
-            raise InputError("state = None: LuGre has states of its own; `start(contact)` gives the settled ones.")
+            raise InputError("state = None: LuGre has states of its own; `start(contact)` gives the steady state.")
         load, speed = need_load(contact, "LuGre"), need_slip_speed(contact, "LuGre")
         s_x, s_y = practical(contact)
         rates = self.derivatives(contact, state)
@@ -99,7 +100,7 @@ class LuGre(AbstractDynamicTyre):
         return Forces(F_x=load * mu_x, F_y=load * mu_y)
 
     def _fading_rates(self, contact: Contact, s_x, s_y):
-        """Rate at which a deflection is lost, over the slips' speed, 1/m, in both directions."""
+        """The decay rate of the deflections over the `slip_speed`, 1/m, in both directions."""
         slides = numerics.hypot(s_x, s_y)
         g = self._friction(need_slip_speed(contact, "LuGre") * slides) * jnp.maximum(contact.friction, LEAST_FRICTION)
         rolls = jnp.abs(_travels(contact) + s_x)
@@ -112,15 +113,15 @@ class LuGre(AbstractDynamicTyre):
         return fading(self.stiffness_x), fading(self.stiffness_y)
 
     def _friction(self, speed):
-        """Friction at a sliding speed (Stribeck)."""
+        """The friction at a sliding speed (Stribeck)."""
         slides = speed > 0
         power = jnp.where(slides, (jnp.where(slides, speed, 1.0) / self.stribeck_speed) ** self.exponent, 0.0)
         return self.kinetic_friction + (self.static_friction - self.kinetic_friction) * jnp.exp(-power)
 
 
 def _travels(contact: Contact):
-    """v_x over the speed that the slips are relative to, with its sign; where that speed is zero nothing moves, and the
-    direction of travel alone is left."""
+    """v_x over the speed to which the slips are relative, with its sign. Where that speed is zero nothing moves, and the result
+    is the direction of travel."""
     forwards = jnp.sign(contact.direction)
     if contact.slip_speed is None:
         return forwards
@@ -130,13 +131,13 @@ def _travels(contact: Contact):
 
 
 def _settled_deflection(slip, fading):
-    """The deflection that stays; zero where nothing moves."""
+    """The steady deflection; zero where nothing moves."""
     moves = fading > 0
     return slip / jnp.where(moves, fading, 1.0)
 
 
 def _inflow(p):
-    """`L kappa`, from 2 at p = 0 to 1: fresh bristles take the place of those that leave the contact deflected."""
+    """`L kappa`, from 2 at p = 0 down to 1: undeflected bristles replace the deflected ones that leave the contact."""
     large = p >= 1
     q = jnp.where(large, p, 2.0)
     gone = -jnp.expm1(-q)

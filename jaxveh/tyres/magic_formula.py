@@ -1,4 +1,4 @@
-"""The Magic Formula in its form of four coefficients and two shifts: pure lateral slip."""
+"""The Magic Formula with four coefficients and two shifts, for pure lateral slip."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class MagicFormula(AbstractTyre):
 
     - `B` (1/rad) stiffness factor, `C` (-) shape factor, `D` (N) peak factor: all positive; `E` (-) curvature factor.
     - `S_h` (rad) horizontal and `S_v` (N) vertical shift, default 0.
-    - `nominal_load` (N): where given, the force scales with `load / nominal_load` and vanishes with the load;
-      without, `D` is the force of the axle (or wheel) at whatever load it has.
+    - `nominal_load` (N): if given, the force is proportional to `load / nominal_load`. Without it `D` is the peak force of the
+      axle (or wheel) at any load.
 
-    The contact's friction multiplies D and S_v, so that there is no force without friction. Camber, slip ratio and
-    speed do not count. Positive slip angle gives positive force, the sign of this package; files in ISO-W axes have
-    the other.
+    The contact's friction multiplies D and S_v, so that there is no force without friction. Camber, slip ratio and speed have
+    no effect. A positive slip angle gives a positive force, as everywhere in this package; files in ISO-W axes have the
+    opposite sign.
 
     **Raises** `InputError` for B, C, D or nominal_load not positive, or a coefficient that is not finite.
     """
@@ -41,7 +41,7 @@ class MagicFormula(AbstractTyre):
     nominal_load: jax.Array | None = positive("N", default=None)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
-        """Lateral force alone, N, in the shape of slip angle, load and friction together."""
+        """The lateral force only, N, in the shape to which slip angle, load and friction broadcast."""
         x = self.B * (contact.slip_angle + self.S_h)
         bent = x - self.E * (x - numerics.arctan(x))
         F_y = self.D * numerics.sin(self.C * numerics.arctan(bent)) + self.S_v
@@ -59,10 +59,10 @@ class MagicFormula(AbstractTyre):
 
     @property
     def peak(self) -> jax.Array:
-        """The largest force the law can give, less `S_v`, N, at nominal load and full friction.
+        """The largest force of the law without `S_v`, N, at nominal load and full friction.
 
-        It is D where `C atan(.)` reaches a quarter turn: for C >= 1 unless E exceeds 1, where the inner function
-        turns back at `B x = 1 / sqrt(E - 1)`.
+        It is D if `C atan(.)` reaches a quarter turn, which is so for C >= 1 and E <= 1. For E > 1 the inner function has its
+        maximum at `B x = 1 / sqrt(E - 1)`.
         """
         root = numerics.sqrt(jnp.maximum(self.E - 1.0, 0.0))
         turning = self.E * numerics.arctan2(jnp.ones_like(root), root) - root

@@ -1,4 +1,4 @@
-"""A tyre on a road of its own: friction as a parameter of the model instead of an input."""
+"""A tyre with its own road friction: friction as a parameter of the model instead of an input."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_static
 class OnRoad(AbstractTyre):
     """`tyre` with the contact's friction multiplied by `friction` (-), a positive parameter.
 
-    A contact carries the road's friction already; this makes it a leaf, to be estimated or fitted for each axle
-    (`lambda car: car.front.friction`). What friction does is the wrapped law's affair: `Brush`, `Dugoff`, `Fiala` and `MFTyre`
-    bound their force by it, `MagicFormula` scales its whole curve, slope included (`Similarity` around it keeps the slope).
-    `Linear` does not use it: by the similarity rule a law without a limit stays as it is. A dynamic tyre takes its road
-    inside: `Relaxed(OnRoad(tyre, 0.5), ...)`; `LuGre` has friction of its own.
+    A contact already has the road's friction. This wrapper adds a friction that is a parameter and can be estimated or fitted
+    for each axle (`lambda car: car.front.friction`). Its effect depends on the wrapped law: in `Brush`, `Dugoff`, `Fiala` and
+    `MFTyre` friction bounds the force; in `MagicFormula` it scales the whole curve, slope included (`Similarity` around it
+    keeps the slope). `Linear` does not use it: by the similarity rule a law without a limit does not change. A dynamic tyre
+    wraps the tyre on its road: `Relaxed(OnRoad(tyre, 0.5), ...)`. `LuGre` has its own friction parameters.
 
     **Raises** `InputError` for a friction that is not positive, or a tyre with states.
     """

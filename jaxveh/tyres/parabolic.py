@@ -1,4 +1,4 @@
-"""The parabolic tyre: a parabola up to friction, and the friction circle."""
+"""The parabolic tyre: a parabola up to the friction limit, and the friction circle for combined slip."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class Parabolic(AbstractTyre):
 
     - `cornering_stiffness` (N/rad), `friction` (-).
     - `slip_stiffness` (N): of the same parabola in slip ratio, which gives F_x; None for no longitudinal force. The source takes
-      F_x as known: this is our choice, with which the total stays within `mu F_z`. Where F_x takes all (a locked wheel)
-      the friction circle leaves nothing sideways.
+      F_x as known. This law is our own choice; with it the total force stays within `mu F_z`. If F_x uses all of the friction
+      (a locked wheel), there is no lateral force.
 
     **Raises** `InputError` for parameters that are not positive, or a contact without a load.
     """
@@ -37,13 +37,13 @@ class Parabolic(AbstractTyre):
         if self.slip_stiffness is None:
             return Forces(F_y=F_y)
         F_x, q = _parabola(self.slip_stiffness * contact.slip_ratio, limit)
-        # sqrt(1 - (F_x / limit)^2), in a form without infinite slope where F_x takes all.
+        # sqrt(1 - (F_x / limit)^2), in a form without infinite slope where F_x uses all of the friction.
         left = (1 - q) * numerics.sqrt(1 + q * (2 - q))
         return Forces(F_x=F_x, F_y=left * F_y)
 
 
 def _parabola(wish, limit):
-    """The force of a wish `C slip` within a limit, and the slip over that of the peak, at most 1."""
+    """The force of the linear force `wish` (`C slip`) under a limit, and the slip over the slip of the peak, at most 1."""
     held = limit > 0
     q = jnp.abs(wish) / jnp.where(held, 2 * limit, 1.0)
     sticks = (q < 1) & held

@@ -1,4 +1,4 @@
-"""Tyres of few parameters as a short TOML file that a person can read and edit."""
+"""Tyres with few parameters as short TOML files that are easy to read and edit."""
 
 from __future__ import annotations
 
@@ -32,22 +32,22 @@ MODELS: dict[str, type[AbstractTyre]] = {
         LinearWithLoad, MagicFormula, Parabolic, UniTire,
     )
 }  # fmt: skip
-"""The laws whose parameters are one number each, or a word."""
+"""The laws whose parameters are single numbers or words."""
 
 
 def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", overwrite: bool = False) -> None:
-    """Write a tyre's parameters as TOML, SI units and radians; `note` is a comment at its top.
+    """Write a tyre's parameters as TOML, in SI units and radians; `note` is a comment at its top.
 
-    The file is a table `[tyre]`: `model`, the law's name, and a number for each parameter (a text for a choice in words); one
-    that is None is left out.
+    The file has one table `[tyre]` with `model`, the law's name, and a number for each parameter (a string for an option).
+    Parameters that are None are left out.
 
-    **Raises** `InputError` for a law that is not in `MODELS`, parameters that are no finite scalars, and where the file exists
-    and `overwrite` is not set.
+    **Raises** `InputError` for a law that is not in `MODELS`, parameters that are not finite scalars, or an existing file without
+    `overwrite`.
     """
     name = type(tyre).__name__
     if MODELS.get(name) is not type(tyre):
         raise InputError(
-            f"write_parameters: tyre = {name}: must be one of {', '.join(MODELS)}; for MFTyre there is to_property_file."
+            f"write_parameters: tyre = {name}: must be one of {', '.join(MODELS)}; for MFTyre use to_property_file."
         )
     lines = [f"# {line}".rstrip() for line in note.splitlines()]
     lines += ["# SI units and radians.", "[tyre]", f"model = {kit.toml_string(name)}"]
@@ -61,17 +61,16 @@ def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", ov
         value = np.asarray(value)
         if value.shape != () or not np.isfinite(value):
             raise InputError(f"{name}.{field.name} = {value}: must be one finite number to be written.")
-        # The fewest digits that are this value in its own precision.
+        # The fewest digits that represent this value in its own precision.
         shown, unit = repr(float(str(value[()]))), field.metadata["unit"]
         lines.append(f"{field.name:<{width}} = {shown}" + ("" if unit == "-" else f"  # {unit}"))
     write_text("\n".join(lines) + "\n", path, overwrite=overwrite)
 
 
 def read_parameters(path: str | Path) -> AbstractTyre:
-    """The tyre of a file as `write_parameters` writes it; parameters that have a default may be left out.
+    """The tyre of a file in the format of `write_parameters`; parameters with a default may be missing.
 
-    **Raises** `InputError` for a file that is no TOML, an unknown model or parameter, one that is missing, no number, or out of
-    range.
+    **Raises** `InputError` for a file that is not TOML, an unknown model, or an unknown, missing or invalid parameter.
     """
     path = Path(path)
     content = kit.read_toml(path)
@@ -90,7 +89,7 @@ def read_parameters(path: str | Path) -> AbstractTyre:
         if field.default is dataclasses.MISSING and field.name not in table:
             raise InputError(f"{where}: {field.name} is missing; {name} needs it ({field.metadata['unit']}).")
     values: dict[str, Any] = {
-        # What has no unit is a choice in words.
+        # Fields without a unit are options given as words.
         key: (kit.toml_number if "unit" in fields[key].metadata else kit.toml_text)(f"{where} {key}", value)
         for key, value in table.items()
         if key != "model"

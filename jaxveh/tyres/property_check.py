@@ -1,8 +1,8 @@
-"""What is odd about a tyre property file: a list to read before the tyre is believed.
+"""Findings about a tyre property file: a list of oddities to read before the tyre is used.
 
-That C > 0, D > 0, E <= 1, B_t > 0 and that the weights of combined slip stay positive over the file's own ranges are the
-restrictions of H. B. Pacejka, Tire and Vehicle Dynamics, 3rd edition (2012), section 4.3.2. The other limits are wide ones of
-road tyres, from a racing car's to a truck's.
+The restrictions C > 0, D > 0, E <= 1, B_t > 0 and positive weights of combined slip over the file's own ranges are those of
+H. B. Pacejka, Tire and Vehicle Dynamics, 3rd edition (2012), section 4.3.2. The other limits are wide ranges for road tyres,
+from racing cars to trucks.
 """
 
 from __future__ import annotations
@@ -25,29 +25,30 @@ from jaxveh.tyres.property_file import SIDES, from_property_file, tells
 from jaxveh.tyres.property_lines import PropertyFinding, first_of, odd_lines
 
 USUAL = {
-    "mu_x": ("friction along", 0.2, 3.0, ""),
-    "mu_y": ("friction across", 0.2, 3.0, ""),
+    "mu_x": ("longitudinal friction", 0.2, 3.0, ""),
+    "mu_y": ("lateral friction", 0.2, 3.0, ""),
     "K_xk": ("slip stiffness over load", 5.0, 80.0, ""),
     "K_ya": ("cornering stiffness over load", 3.0, 60.0, " 1/rad"),
     "rho": ("deflection over radius", 0.01, 0.2, ""),
     "trail": ("pneumatic trail over radius", 0.0, 0.3, ""),
     "F_y": ("lateral force without slip angle over load", -0.1, 0.1, ""),
-    "sigma_x": ("relaxation length along", 0.01, 3.0, " m"),
-    "sigma_y": ("relaxation length across", 0.01, 3.0, " m"),
+    "sigma_x": ("longitudinal relaxation length", 0.01, 3.0, " m"),
+    "sigma_y": ("lateral relaxation length", 0.01, 3.0, " m"),
 }
-"""Of a tyre that rolls freely at its nominal load: what to call it, the usual least and largest value, and the unit."""
+"""Quantities of a tyre that rolls freely at its nominal load: the name, the usual least and greatest value, and the unit."""
 
 PER_LOAD, PER_RADIUS = ("K_xk", "K_ya", "F_y"), ("rho", "trail")
 
 GRID = 11
-"""Points over a range of the file."""
+"""The number of points over a range of the file."""
 
 
 def check_property_file(source: str | Path | PropertyFile) -> list[PropertyFinding]:
-    """What is worth a look in a .tir file; an empty list where nothing is.
+    """Findings about a .tir file; an empty list if there are none.
 
-    It tells of what is missing, of ranges and units that are odd, of scaling factors other than 1, of entries that are not
-    read or cannot be, and of a tyre that behaves as hardly any does. **Raises** `InputError` where `from_property_file` does.
+    `source`: the path, or the `PropertyFile`. The function reports missing values, odd ranges and units, scaling factors other
+    than 1, entries that are not read or cannot be read, and unusual behaviour of the tyre. **Raises** `InputError` where
+    `from_property_file` does.
     """
     file = source if isinstance(source, PropertyFile) else read_property_file(source)
     tyre = from_property_file(file)
@@ -73,39 +74,39 @@ def check_property_file(source: str | Path | PropertyFile) -> list[PropertyFindi
 def _model(file: PropertyFile, version: int) -> Iterator[PropertyFinding]:
     side, kind, mode = (first_of(file, key) for key in ("TYRESIDE", "PROPERTY_FILE_FORMAT", "USE_MODE"))
     if side is None:
-        yield PropertyFinding("TYRESIDE", "is missing: the side for which the coefficients hold is not known")
+        yield PropertyFinding("TYRESIDE", "is missing: the side for which the coefficients hold is unknown")
     elif str(side.value).strip().lower() not in SIDES:
         yield PropertyFinding("TYRESIDE", f"is {side.short_value}, neither LEFT nor RIGHT: the tyre cannot be mirrored")
     if file.find("FITTYP") is None and kind is not None and str(kind.value).upper().startswith("MF"):
         yield PropertyFinding(
-            "FITTYP", f"is missing: {version / 10:g} is taken because of PROPERTY_FILE_FORMAT = {kind.short_value}"
+            "FITTYP", f"is missing: {version / 10:g} is used because of PROPERTY_FILE_FORMAT = {kind.short_value}"
         )
     elif file.text("FITTYP") == "60":
-        yield PropertyFinding("FITTYP", "is 60: the equations of 6.1 are taken")
+        yield PropertyFinding("FITTYP", "is 60: the equations of 6.1 are used")
     if mode is not None and not isinstance(mode.value, str):
         if mode.value < 0:
             yield PropertyFinding(
-                "USE_MODE", f"is {mode.value:g}: asks for a mirrored tyre; the tyre comes as it is (see `side`)"
+                "USE_MODE", f"is {mode.value:g}: asks for a mirrored tyre; the tyre is not mirrored (see `side`)"
             )
         elif abs(mode.value) % 10 < 4:
             yield PropertyFinding(
-                "USE_MODE", f"is {mode.value:g}: fitted without combined slip, which is computed all the same"
+                "USE_MODE", f"is {mode.value:g}: fitted without combined slip; combined slip is computed nevertheless"
             )
     if "UNITS" not in file.sections:
-        yield PropertyFinding("[UNITS]", "is missing: SI units and radians are taken")
+        yield PropertyFinding("[UNITS]", "is missing: SI units and radians are assumed")
     angle = str(file.sections.get("UNITS", {}).get("ANGLE", "radian")).strip().lower()
     if angle not in kit.PROPERTY_UNITS["ANGLE"]:
-        yield PropertyFinding("ANGLE", f"is {angle!r}: ranges and coefficients are taken in radians all the same")
+        yield PropertyFinding("ANGLE", f"is {angle!r}: ranges and coefficients are read in radians nevertheless")
 
 
 def _missing_values(file: PropertyFile, tyre: MFTyre) -> Iterator[PropertyFinding]:
-    """Values of which a default is taken that no one should rely on."""
+    """Missing values with defaults that should not be relied on."""
     wanted = ["LONGVL", "VERTICAL_STIFFNESS"]
     if tyre.version != 52:
         wanted += ["NOMPRES", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS"]
     for key in wanted:
         if not tells(file, key):
-            yield PropertyFinding(key, f"is missing: {float(getattr(tyre.structure, key)):g} is taken")
+            yield PropertyFinding(key, f"is missing: {float(getattr(tyre.structure, key)):g} is used")
     speed = float(tyre.structure.LONGVL)
     if not 5 <= speed <= 50:
         yield PropertyFinding(
@@ -123,7 +124,7 @@ def _ranges(file: PropertyFile, tyre: MFTyre) -> Iterator[PropertyFinding]:
             yield PropertyFinding(f"{low}, {high}", f"are {least:g} and {most:g}: the range is empty")
         elif low in ("KPUMIN", "ALPMIN", "CAMMIN") and not least < 0 < most:
             yield PropertyFinding(
-                f"{low}, {high}", f"are {least:g} and {most:g}: one side only was measured, the other is held at 0"
+                f"{low}, {high}", f"are {least:g} and {most:g}: only one side was measured, the other is limited to 0"
             )
     for key, largest in (("ALPMIN", 3.2), ("ALPMAX", 3.2), ("CAMMIN", 3.2), ("CAMMAX", 3.2)):
         if abs(float(getattr(r, key))) > largest:
@@ -157,7 +158,7 @@ def _scaling_findings(tyre: MFTyre) -> Iterator[PropertyFinding]:
     factors = {name: float(value) for name, value in vars(tyre.scaling).items()}
     changed = [f"{name} = {value:g}" for name, value in factors.items() if value != 1]
     if changed:
-        yield PropertyFinding("scaling", f"{', '.join(changed)}: not 1, so the tyre differs from what was measured")
+        yield PropertyFinding("scaling", f"{', '.join(changed)}: not 1, so the tyre differs from the measured one")
 
 
 def _body(tyre: MFTyre) -> Iterator[PropertyFinding]:
@@ -180,13 +181,13 @@ def _shapes(tyre: MFTyre) -> Iterator[PropertyFinding]:
             yield PropertyFinding(key, f"gives a shape factor C of {float(shape):g}: must be positive")
         elif not 1 <= float(shape) <= 2:
             what = "the force never peaks" if float(shape) < 1 else "the force reverses its sign at large slip"
-            yield PropertyFinding(key, f"gives a shape factor C of {float(shape):g}: usual are 1 to 2; {what}")
+            yield PropertyFinding(key, f"gives a shape factor C of {float(shape):g}: usual values are 1 to 2; {what}")
 
 
 class _Freely(NamedTuple):
     """A tyre without limits that rolls freely: first at its nominal load, then at every load, camber and pressure of the ranges.
 
-    One evaluation, so that one program is compiled for it.
+    All points are evaluated together, so that only one program is compiled.
     """
 
     load: np.ndarray
@@ -203,12 +204,12 @@ def _freely(tyre: MFTyre) -> _Freely:
     nominal = float(s.FNOMIN * tyre.scaling.LFZO), 0.0, own
     load, camber, pressure = (np.append(at, values) for at, values in zip(nominal, grid, strict=True))
     at = Contact(load=jnp.asarray(load), camber=jnp.asarray(camber), pressure=jnp.asarray(pressure))
-    # Limits would make friction positive in the outputs whatever the coefficients say.
+    # With limits the friction in the outputs is positive for any coefficients.
     return _Freely(load, camber, pressure, _outputs(dataclasses.replace(tyre, limits=False), at))
 
 
 def _usual(tyre: MFTyre, freely: _Freely) -> Iterator[PropertyFinding]:
-    """The tyre that rolls freely at its nominal load, against what tyres do."""
+    """The freely rolling tyre at its nominal load compared with the ranges in `USUAL`."""
     s = tyre.structure
     for field, (what, least, most, unit) in USUAL.items():
         value = float(np.broadcast_to(freely.found[field], freely.load.shape)[0])
@@ -219,14 +220,14 @@ def _usual(tyre: MFTyre, freely: _Freely) -> Iterator[PropertyFinding]:
         if not least <= value <= most:
             advice = "; is PKY1 meant for other axes than ISO-W?" if field == "K_ya" and value < 0 else ""
             yield PropertyFinding(
-                what, f"is {value:.3g}{unit} at nominal load; usual are {least:g} to {most:g}{advice}"
+                what, f"is {value:.3g}{unit} at nominal load; usual values are {least:g} to {most:g}{advice}"
             )
 
 
 def _friction_over_range(freely: _Freely) -> Iterator[PropertyFinding]:
-    """D > 0 at every load, camber and pressure of the ranges, where it is so at nominal load."""
+    """D > 0 at every load, camber and pressure of the ranges, checked if it is positive at nominal load."""
     load, camber, pressure = freely.load, freely.camber, freely.pressure
-    for field, what in (("mu_x", "friction along"), ("mu_y", "friction across")):
+    for field, what in (("mu_x", "longitudinal friction"), ("mu_y", "lateral friction")):
         mu = np.broadcast_to(freely.found[field], load.shape)
         if mu[0] > 0 >= mu.min():
             worst = mu.argmin()
@@ -237,7 +238,7 @@ def _friction_over_range(freely: _Freely) -> Iterator[PropertyFinding]:
 
 
 def _curvature(tyre: MFTyre) -> Iterator[PropertyFinding]:
-    """E <= 1 at every load, without camber (with it E is far off in most files); the equations hold it at 1."""
+    """E <= 1 at every load at zero camber (with camber most files violate it by far); the equations limit it to 1."""
     x, y, z, s, df_z = tyre.longitudinal, tyre.lateral, tyre.aligning, tyre.scaling, _df_z(tyre)
     along = (x.PEX1 + x.PEX2 * df_z + x.PEX3 * df_z**2) * s.LEX
     across = (y.PEY1 + y.PEY2 * df_z) * s.LEY
@@ -252,7 +253,7 @@ def _curvature(tyre: MFTyre) -> Iterator[PropertyFinding]:
     for about, curvature in curvatures.items():
         worst = int(jnp.argmax(curvature))
         if curvature[worst] > 1:
-            says = f"give a curvature factor E of {float(curvature[worst]):.3g} at {_loads(tyre)[worst]:.0f} N: it is held at 1"
+            says = f"give a curvature factor E of {float(curvature[worst]):.3g} at {_loads(tyre)[worst]:.0f} N: limited to 1"
             yield PropertyFinding(about, says)
 
 
@@ -271,7 +272,7 @@ def _aligning_findings(tyre: MFTyre) -> Iterator[PropertyFinding]:
 
 
 def _combined_findings(tyre: MFTyre) -> Iterator[PropertyFinding]:
-    """The weights of combined slip are positive: a force fades with the other slip, and never reverses its sign."""
+    """The weights of combined slip are positive: the other slip reduces a force and never reverses its sign."""
     r = tyre.ranges
     slip_ratio, slip_angle = min(-float(r.KPUMIN), 0.5), min(float(r.ALPMAX), 0.5)
     if slip_ratio <= 0 or slip_angle <= 0:
@@ -284,7 +285,7 @@ def _combined_findings(tyre: MFTyre) -> Iterator[PropertyFinding]:
     )
     brakes, turns = force(angle, -ratio), force(-angle, -ratio)
     alone_x, alone_y = force(0 * angle, -ratio).F_x, force(angle, 0 * ratio).F_y - force(-angle, 0 * ratio).F_y
-    # What slip ratio adds to F_y is the same for both slip angles, so that it is not in their difference.
+    # The force that slip ratio adds to F_y is the same at both slip angles, so that their difference does not contain it.
     for about, name, weight, slip in (
         ("RBX1 to RHX1", "F_x", np.asarray(brakes.F_x / alone_x), np.degrees(angle)),
         ("RBY1 to RHY2", "F_y", np.asarray((brakes.F_y - turns.F_y) / alone_y), -ratio),
@@ -292,7 +293,7 @@ def _combined_findings(tyre: MFTyre) -> Iterator[PropertyFinding]:
         if weight.min() < 0:
             worst, unit = np.unravel_index(weight.argmin(), weight.shape), " degrees" if name == "F_x" else ""
             what = "slip angle" if name == "F_x" else "slip ratio"
-            says = f"turn {name} round: {weight.min():.3g} of it is left at {load[worst]:.0f} N and a {what} of"
+            says = f"reverse {name}: {weight.min():.3g} of it remains at {load[worst]:.0f} N and a {what} of"
             yield PropertyFinding(about, f"{says} {slip[worst]:.3g}{unit}; must be positive")
 
 
@@ -302,7 +303,7 @@ def _moments(tyre: MFTyre) -> Iterator[PropertyFinding]:
     first, second = told(range(1, 12)), told(range(12, 15))
     if tyre.version == 61 and first and second:
         yield PropertyFinding(
-            ", ".join(second), "are not 0, nor are QSX1 to QSX11: two forms of M_x that MF-Tyre does not take together"
+            ", ".join(second), "are not 0, nor are QSX1 to QSX11: two forms of M_x that MF-Tyre does not use together"
         )
     rolling = float(tyre.rolling.QSY1)
     if not 0 <= rolling <= 0.05:
@@ -317,12 +318,12 @@ def _outputs(tyre: MFTyre, contact: Contact) -> dict[str, Any]:
 
 @eqx.filter_jit
 def _forces(tyre: MFTyre, contact: Contact) -> Any:
-    """Without the moments, which take most of the compiling."""
+    """The forces without the moments, which take most of the compilation time."""
     return tyre.forces(contact)._replace(M_x=0.0, M_y=0.0, M_z=0.0)
 
 
 def _loads(tyre: MFTyre) -> np.ndarray:
-    """Loads over the file's range, but from a tenth to three times the nominal one."""
+    """Loads over the file's range, but only from a tenth to three times the nominal load."""
     r, nominal = tyre.ranges, float(tyre.structure.FNOMIN * tyre.scaling.LFZO)
     return np.linspace(max(float(r.FZMIN), 0.1 * nominal), min(float(r.FZMAX), 3 * nominal), GRID)
 

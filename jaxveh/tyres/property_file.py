@@ -1,4 +1,4 @@
-"""From a tyre property file to a tyre."""
+"""Tyres from tyre property files."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from jaxveh.tyres.mf_tyre.typical import TYPICAL_COEFFICIENTS
 from jaxveh.tyres.mirrored import Mirrored
 
 SIDES = ("left", "right")
-"""What TYRESIDE may say, capitals or not."""
+"""The allowed values of TYRESIDE, in upper or lower case."""
 
 VERSION_OF_FITTYP = {5: 52, 6: 52, 21: 52, 52: 52, 60: 61, 61: 61, 62: 62}
-"""What the key FITTYP says."""
+"""The version of the equations for each value of the key FITTYP."""
 
 OLD_FORMATS = ("PAC2002", "MF_05", "MF-TYRE", "MF_TYRE")
-"""PROPERTY_FILE_FORMAT of files that need no FITTYP: their equations are those of version 5.2."""
+"""The values of PROPERTY_FILE_FORMAT of files that need no FITTYP: their equations are those of version 5.2."""
 
 NEEDED = ("FNOMIN", "UNLOADED_RADIUS", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
-"""What no tyre can do without; for all else see `TYPICAL_COEFFICIENTS`."""
+"""The required coefficients; `TYPICAL_COEFFICIENTS` has the defaults of the others."""
 
 NOT_MEASURED = (
     "WIDTH", "VERTICAL_STIFFNESS", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS", "NOMPRES", "INFLPRES", "LONGVL", "Q_RE0",
 )  # fmt: skip
-"""What must be positive, and what tools write as zero where it was not measured."""
+"""Quantities that must be positive; tools write zero if they were not measured."""
 
 DIMENSIONS = {
     "UNLOADED_RADIUS": (1, 0, 0), "WIDTH": (1, 0, 0), "RIM_RADIUS": (1, 0, 0), "BOTTOM_OFFST": (1, 0, 0),
@@ -49,7 +49,7 @@ DIMENSIONS = {
     "VERTICAL_STIFFNESS": (-1, 1, 0), "LONGITUDINAL_STIFFNESS": (-1, 1, 0), "LATERAL_STIFFNESS": (-1, 1, 0),
     "NOMPRES": (-2, 1, 0), "INFLPRES": (-2, 1, 0), "PRESMIN": (-2, 1, 0), "PRESMAX": (-2, 1, 0),
 }  # fmt: skip
-"""Powers of the file's units of length, force and time in what has a dimension."""
+"""The powers of the file's units of length, force and time in each quantity with a dimension."""
 
 
 @overload
@@ -84,14 +84,14 @@ def from_property_file(
 ) -> MFTyre | Mirrored:
     """The tyre of a .tir file of MF-Tyre 5.2 (PAC2002, MF_05), 6.1 or 6.2, in SI units.
 
-    `side`, `left` or `right`: the side of the car on which the tyre is mounted; it comes mirrored where TYRESIDE, for which
-    the file's coefficients hold, is the other one. None takes it as it is. The version comes from FITTYP or
-    PROPERTY_FILE_FORMAT; `limits`, `angles` and `spins` as in `MFTyre`. Where the file is silent coefficients are
-    `TYPICAL_COEFFICIENTS`, or zero; an entry without a value is silent, and so is a zero for what is `NOT_MEASURED`.
-    `check_property_file` tells of both.
+    `source`: the path, or the `PropertyFile`. `side`, `left` or `right`: the side of the car on which the tyre is mounted. The
+    tyre is mirrored if TYRESIDE, the side for which the file's coefficients hold, is the other one. None: it is not mirrored.
+    The version comes from FITTYP or PROPERTY_FILE_FORMAT; `limits`, `angles` and `spins` as in `MFTyre`. Missing coefficients
+    are those of `TYPICAL_COEFFICIENTS`, or zero. An entry without a value counts as missing, and so does a zero in
+    `NOT_MEASURED`; `check_property_file` reports both.
 
-    **Raises** `InputError` for a version that is not in, a coefficient of the tyre that is no finite number (entries that it
-    does not read may say what they like), a needed one that is missing, and a `side` where the file does not tell its own.
+    **Raises** `InputError` for an unknown version, a coefficient of the tyre that is not a finite number (entries that the
+    tyre does not use may have any value), a required coefficient that is missing, and a `side` if the file has no TYRESIDE.
     """
     file = source if isinstance(source, PropertyFile) else read_property_file(source)
     tyre = _as_it_is(file, limits, angles, spins)
@@ -102,12 +102,12 @@ def from_property_file(
 
 
 def side_of(file: PropertyFile) -> str:
-    """`left` or `right`, the side for which the coefficients hold. **Raises** `InputError` where the file does not say."""
+    """`left` or `right`, the side for which the coefficients hold. **Raises** `InputError` if the file has no valid TYRESIDE."""
     said = file.text("TYRESIDE").strip().lower()
     if said not in SIDES:
         raise InputError(
             f"{file.source}: TYRESIDE = {file.text('TYRESIDE', '')!r}: must be 'LEFT' or 'RIGHT' (in [MODEL]) before the "
-            "tyre can be mounted on a side; without `side` it is taken as it is."
+            "tyre can be mounted on a side; without `side` it is not mirrored."
         )
     return said
 
@@ -142,7 +142,7 @@ def _as_it_is(file: PropertyFile, limits: bool, angles: bool, spins: bool) -> MF
 
 
 def version_of(file: PropertyFile) -> int:
-    """52, 61 or 62. **Raises** `InputError` for others, and where the file does not say."""
+    """The version of the equations: 52, 61 or 62. **Raises** `InputError` for other versions, and if the file has none."""
     entry = file.find("FITTYP")
     if entry is not None:
         number = file.number("FITTYP")
@@ -160,19 +160,19 @@ def version_of(file: PropertyFile) -> int:
 
 
 def size_of(file: PropertyFile, powers: tuple[int, int, int]) -> float:
-    """The size in SI of these powers (see `DIMENSIONS`) of a file's units."""
+    """The factor to SI of a quantity with these powers (see `DIMENSIONS`) of the file's units."""
     length, force, time = powers
     return file.unit("LENGTH") ** length * file.unit("FORCE") ** force * file.unit("TIME") ** time
 
 
 def tells(file: PropertyFile, key: str) -> bool:
-    """Whether the file says this coefficient."""
+    """Whether the file has a value of this coefficient."""
     entry = file.find(key)
     return entry is not None and not (key in NOT_MEASURED and entry.value == 0)
 
 
 def _numbers(file: PropertyFile, kind: type, size: dict[str, float]) -> dict[str, float]:
-    """The coefficients of one section: the file's, typical ones where it is silent."""
+    """The coefficients of one section: those of the file, and typical ones where they are missing."""
     names = [field.name for field in dataclasses.fields(kind)]
     found = {name: TYPICAL_COEFFICIENTS[name] for name in names if name in TYPICAL_COEFFICIENTS}
     found |= {name: _number(file, name, size.get(name, 1.0)) for name in names if tells(file, name)}
@@ -182,7 +182,7 @@ def _numbers(file: PropertyFile, kind: type, size: dict[str, float]) -> dict[str
 
 
 def _number(file: PropertyFile, name: str, size: float) -> float:
-    """A coefficient in SI units that is finite in the precision that tyres have."""
+    """A coefficient in SI units, finite in the precision of a tyre's parameters."""
     value = file.number(name) * size
     largest = float(np.finfo(jax.dtypes.canonicalize_dtype(float)).max)
     if abs(value) > largest:

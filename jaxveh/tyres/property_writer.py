@@ -1,4 +1,4 @@
-"""From a tyre to a tyre property file: a new one, or one that was read with other numbers."""
+"""Tyre property files from tyres: a new file, or an existing file with other numbers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.property_file import DIMENSIONS, SIDES, from_property_file, size_of, version_of
 
 FITTYP = {52: 6, 61: 61, 62: 62}
-"""What FITTYP says of each version."""
+"""The value of FITTYP for each version."""
 
 HEADER = """\
 [MDI_HEADER]
@@ -60,14 +60,14 @@ WHOLE = {
     "aligning": "ALIGNING_COEFFICIENTS",
     "turn_slip": "TURNSLIP_COEFFICIENTS",
 }
-"""The parts of a tyre that are a section each."""
+"""The parts of a tyre with a section of their own."""
 
 ROUNDS = 2
-"""A nominal pressure that is written can change what a silent INFLPRES means: that shows in a second round."""
+"""Rounds of changes: a nominal pressure that is written can change the default of a missing INFLPRES. A second round adds it."""
 
 
 class _Coefficient(NamedTuple):
-    """A coefficient's `section`, `name`, `unit`, and its `value`: an array scalar of the tyre's dtype, SI units."""
+    """A coefficient: its `section`, `name`, `unit` and `value`, an array scalar of the tyre's dtype in SI units."""
 
     section: str
     name: str
@@ -84,25 +84,26 @@ def to_property_file(
 ) -> PropertyFile:
     """The .tir file of a tyre: `io.write_property_file` writes it, `from_property_file` reads the same tyre from it.
 
-    Without `like` a new file in SI units with every coefficient in its usual section; `side` is its TYRESIDE. With `like`, a
-    file that was read, the same file with other numbers: comments, columns, units and unknown sections stay, and coefficients
-    that it lacks are added to their sections where silence would mean something else. In units other than SI, numbers may
-    come back different in the last digit. `note` becomes comment lines under the file's first heading.
+    Without `like` the result is a new file in SI units with every coefficient in its usual section; `side` is its TYRESIDE.
+    With `like`, a file that was read, the result is the same file with other numbers: comments, columns, units and unknown
+    sections stay. Missing coefficients are added to their sections if their default differs from the tyre's value. In units
+    other than SI, numbers that are read again may differ in the last digit. `note` becomes comment lines under the file's first
+    heading.
 
-    A file does not hold `limits`, `angles` and `spins`; coefficients of turn slip that the tyre lacks are left out.
+    A file does not contain `limits`, `angles` and `spins`. If the tyre has no turn slip, its coefficients are left out.
 
-    **Raises** `InputError` for another kind of tyre, coefficients that are no finite scalars, and a `side` beside `like`,
-    which has its own.
+    **Raises** `InputError` for another kind of tyre, coefficients that are not finite scalars, and a `side` together with
+    `like`, which has its own side.
     """
     if not isinstance(tyre, MFTyre):
         raise InputError(
-            f"to_property_file: tyre = {type(tyre).__name__}: must be an MFTyre; other laws: tyres.write_parameters."
+            f"to_property_file: tyre = {type(tyre).__name__}: must be an MFTyre; for other laws use tyres.write_parameters."
         )
     coefficients = list(_coefficients(tyre))
     if like is None:
         return _with_note(_new(tyre, coefficients, side), note)
     if side is not None:
-        raise InputError(f"to_property_file: side = {side!r}: {like.source} tells its own side; leave `side` out.")
+        raise InputError(f"to_property_file: side = {side!r}: {like.source} has its own side; leave `side` out.")
     file = _with_version(like, tyre.version)
     for _ in range(ROUNDS):
         file = _with_changes(file, coefficients)
@@ -128,7 +129,7 @@ def _new(tyre: MFTyre, coefficients: list[_Coefficient], side: str | None) -> Pr
         lines.append(f"{'TYRESIDE':<24} = '{side.upper()}'")
     for section in (*SECTIONS, *WHOLE.values()):
         inside = {one.name: one for one in coefficients if one.section == section}
-        # In the order of this table, not of the tyre's fields, which have another.
+        # In the order of this table, which differs from that of the tyre's fields.
         names = SECTIONS.get(section, tuple(inside))
         if section != "MODEL" and inside:
             lines.append(f"[{section}]")
@@ -148,12 +149,12 @@ def _with_version(file: PropertyFile, version: int) -> PropertyFile:
         if version_of(file) == version:
             return file
     except InputError:
-        pass  # the file does not say: now it does
+        pass  # the file has no version: FITTYP is added below
     return _with_lines(file, "MODEL", [f"{'FITTYP':<24} = {FITTYP[version]}"])
 
 
 def _with_changes(file: PropertyFile, coefficients: list[_Coefficient]) -> PropertyFile:
-    """The file with those numbers replaced or added that it would not read as the tyre's."""
+    """The file with all numbers replaced or added that would otherwise be read with other values than the tyre's."""
     said = {one.name: one.value for one in _coefficients(from_property_file(file))}
     replaced: dict[str, float] = {}
     added: dict[str, list[str]] = {}
@@ -173,12 +174,12 @@ def _with_changes(file: PropertyFile, coefficients: list[_Coefficient]) -> Prope
 
 
 def _number(value: np.ndarray) -> float:
-    """The number with the fewest digits that is this value in its own precision."""
+    """The number with the fewest digits that represents this value in its own precision."""
     return float(str(value[()]))
 
 
 def _in_units(value: float, size: float) -> float:
-    """The number that becomes `value` when it is read, or the nearest one; of several the shortest."""
+    """The number that is read as `value`, or as nearly as possible; the shortest if there are several."""
     near = value / size
     candidates = [float(f"{near:.{digits}g}") for digits in (12, 15)]
     candidates += [near, math.nextafter(near, math.inf), math.nextafter(near, -math.inf)]
@@ -186,7 +187,7 @@ def _in_units(value: float, size: float) -> float:
 
 
 def _with_lines(file: PropertyFile, section: str, lines: list[str]) -> PropertyFile:
-    """The file with lines after the last entry of a section, or with that section at its end."""
+    """The file with `lines` added after the last entry of a section, or in a new section at its end."""
     end = "\r\n" if file.lines[0].endswith("\r\n") else "\n"
     last = max((entry.line for entry in file.entries if entry.section == section), default=None)
     if last is None:
@@ -198,7 +199,7 @@ def _with_lines(file: PropertyFile, section: str, lines: list[str]) -> PropertyF
 
 
 def _with_note(file: PropertyFile, note: str) -> PropertyFile:
-    """The file with comment lines under its first heading, which readers may want to be the first line."""
+    """The file with comment lines under its first heading (other readers may expect that heading in the first line)."""
     if not note:
         return file
     end = "\r\n" if file.lines[0].endswith("\r\n") else "\n"

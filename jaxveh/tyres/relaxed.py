@@ -1,4 +1,4 @@
-"""Relaxation: a tyre's force follows its slip over the road it has rolled, not over time."""
+"""Relaxation: a tyre's force lags behind its slip over a rolled distance, not over a time."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.slip import practical
 
 LEAST_LENGTH = 0.025
-"""The least of a tyre's own relaxation lengths, m: they vanish with the load, and the lag's pole goes with 1 / length."""
+"""The lower bound of a tyre's own relaxation lengths, m: they vanish with the load, and the pole of the lag is proportional to
+1 / length."""
 
 SLIDES = 0.1
-"""The slip that a sliding tyre's deflections do not exceed at standstill (-): about where forces are greatest."""
+"""The limit of the slip of a sliding tyre's deflections at standstill (-): about the slip at which forces are greatest."""
 
 STATES = {"slip": "deflection_", "force": "F_"}
 
@@ -36,38 +37,39 @@ STATES = {"slip": "deflection_", "force": "F_"}
 class Relaxed(AbstractDynamicTyre):
     """Any tyre without states, with a first-order lag over the relaxation lengths `sigma_x` and `sigma_y` (m).
 
-    `of="slip"` (the default): the carcass deflects, and its deflections give the slips that the wrapped law sees
+    `of="slip"` (the default): the carcass deflects, and its deflections give the slips at which the wrapped law is evaluated
     (H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed., sec. 7.2, the single contact point):
 
         du/dt = v_sx - |v| u / sigma_x,    v_sx = omega r_e - v_x,    kappa' = u / sigma_x
         dv/dt = v_sy - |v| v / sigma_y,    v_sy = -v_y,               tan(alpha') = v / sigma_y
 
-    The states are the deflections `deflection_x`, `deflection_y` (m) and not the lagged slips: they are what cannot jump, so
-    that with lengths that go with the load a sudden load changes the slip and not the force (a slip that lags would let the
-    force jump). The driving term is the sliding speed itself, slip times the contact's `slip_speed` V (|v|, where it is None).
-    At large slip the lag in slip is unchanged while the force, once saturated, follows at once.
+    The states are the deflections `deflection_x`, `deflection_y` (m), not the lagged slips. Deflections cannot jump. If the
+    lengths depend on the load, a sudden change of load then changes the slip and not the force (with a lagged slip as the state
+    the force would jump). The driving term is the sliding speed, slip times the contact's `slip_speed` V (|v| if it is None).
+    At large slip the lag of the slip is unchanged, but the saturated force has no lag.
 
-    `of="force"`: `sigma dF/dt = V (F_static - F)`, states `F_x`, `F_y` (N); at large slip the force then lags by the whole
-    length, which is too slow. Moments follow the static law without lag: for the aligning moment use the lag in slip.
+    `of="force"`: `sigma dF/dt = V (F_static - F)` with the states `F_x`, `F_y` (N). At large slip the force then lags by the
+    whole length, which is too slow. Moments follow the static law without lag; for the aligning moment use the lag in slip.
 
-    At standstill deflections hold what they have and take up all sliding. A tyre that slides on and on must not deflect without
-    bound (the book holds the deflection there, sec. 7.2.2): the speed that forgets is max(|v|, min(V, |v_s| / `SLIDES`)), which
-    is |v| wherever V is. So slow sliding ends at a slip of `SLIDES`, faster sliding at the static law's slip.
+    At standstill the deflections stay and take up all sliding. The deflection of a tyre that goes on sliding must be bounded
+    (the book holds the deflection there, sec. 7.2.2). The deflections therefore decay with the speed
+    max(|v|, min(V, |v_s| / `SLIDES`)), which is |v| wherever V is |v|. Slow sliding then ends at a slip of `SLIDES`, faster
+    sliding at the static law's slip.
 
-    A direction without a length does not lag and has no state. With neither length an `MFTyre` takes its own,
-    `outputs(contact).sigma_x` and `.sigma_y` (kept above `LEAST_LENGTH`), at the contact's load. `start` is the state settled at
-    the contact's slips; below a vehicle's crawl speed, where those are less than v_s / |v|, it goes on from there. The pole is
-    at most `-V / sigma`: RK4 needs steps below `2.78 sigma / V` (2.3 ms at 60 m/s with 0.05 m).
+    A direction without a length has no lag and no state. If both lengths are None, an `MFTyre` uses its own,
+    `outputs(contact).sigma_x` and `.sigma_y` (at least `LEAST_LENGTH`), at the contact's load. `start` is the steady state at
+    the contact's slips. Below a vehicle's crawl speed these are smaller than v_s / |v|, and the state moves on from there. The
+    fastest pole is `-V / sigma`: RK4 needs steps below `2.78 sigma / V` (2.3 ms at 60 m/s with 0.05 m).
 
-    **Raises** `InputError` for lengths that are not positive, no lengths for a tyre that has none of its own, a tyre with
-    states, an unknown `of`, or (`derivatives`) a contact without a speed.
+    **Raises** `InputError` for lengths that are not positive, no lengths for a tyre without its own, a tyre with states, an
+    unknown `of`, or (`derivatives`) a contact without a speed.
     """
 
     tyre: AbstractTyre
     sigma_x: jax.Array | None = positive("m", default=None)
     sigma_y: jax.Array | None = positive("m", default=None)
     of: str = eqx.field(static=True, default="slip")
-    # Kept apart from the lengths, which may be taken out while they are estimated.
+    # Separate from the lengths, because those are removed from the model while they are estimated.
     lags: tuple[str, ...] = eqx.field(static=True, default=())
     own: bool = eqx.field(static=True, default=False)
 
@@ -109,7 +111,7 @@ class Relaxed(AbstractDynamicTyre):
         return record("RelaxedState", rates)
 
     def _forgets(self, contact: Contact, slips: dict):
-        """The speed, m/s, at which deflections leave the contact."""
+        """The speed, m/s, with which the deflections decay."""
         speed = need_speed(contact, "Relaxed")
         if contact.slip_speed is None:
             return speed
@@ -117,9 +119,9 @@ class Relaxed(AbstractDynamicTyre):
         return jnp.maximum(speed, jnp.minimum(contact.slip_speed, slides / SLIDES))
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
-        """What the wrapped law gives at the slips that the deflections make, or its moments beside the lagged forces."""
+        """The wrapped law at the slips of the deflections, or the lagged forces with the moments of the wrapped law."""
         if state is None:
-            raise InputError("state = None: Relaxed has states of its own; `start(contact)` gives the settled ones.")
+            raise InputError("state = None: Relaxed has states of its own; `start(contact)` gives the steady state.")
         if self.of == "force":
             lagged = {name: getattr(state, name) for name in self.state_names}
             return self.tyre.forces(contact)._replace(**lagged)
@@ -132,7 +134,7 @@ class Relaxed(AbstractDynamicTyre):
         return self.tyre.forces(contact._replace(**slips))
 
     def _settled_state(self, contact: Contact) -> list:
-        """The states' values after a long way at this contact, in the order of `lags`."""
+        """The steady values of the states at this contact, in the order of `lags`."""
         if self.of == "force":
             forces = self.tyre.forces(contact)
             return [jnp.asarray(getattr(forces, name)) for name in self.state_names]

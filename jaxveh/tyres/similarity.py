@@ -1,4 +1,4 @@
-"""Similarity: one measured curve of pure slip stands for all loads, roads and directions."""
+"""Similarity: one measured curve of pure slip represents all loads, roads and directions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load, need_sta
 from jaxveh.tyres.slip import length, share, theoretical
 
 LEAST_FRICTION = 1e-3
-"""The least friction by which the equivalent slip is divided; the force itself vanishes with the road's."""
+"""The lower bound of the friction by which the equivalent slip is divided; the force still vanishes with the road's friction."""
 
 
 class Similarity(AbstractTyre):
@@ -22,18 +22,18 @@ class Similarity(AbstractTyre):
 
         F_y = f F_z / F_z0 F_y0(alpha_eq),    tan(alpha_eq) = C(F_z) / C(F_z0) F_z0 / (f F_z) tan(alpha)
 
-    with f the contact's friction: less friction or load shrinks the whole curve towards zero, while the slope at zero slip is
-    the cornering stiffness C(F_z), which friction does not change. (The book scales alpha; its tangent keeps the equivalent
-    slip below a quarter turn on slippery roads.)
+    with f the contact's friction. Less friction or load shrinks the whole curve towards zero, while the slope at zero slip is
+    the cornering stiffness C(F_z), which friction does not change. (The book scales alpha; scaling its tangent keeps the
+    equivalent slip angle below a quarter turn on slippery roads.)
 
     `stiffness_load` (N; default None) is the load of the largest cornering stiffness, `C = C_max sin(2 arctan(F_z /
     stiffness_load))`; None: C is proportional to the load. `slip_stiffness_ratio` (-; default None) is the slip stiffness over
-    the cornering stiffness: with it the same curve serves combined slip, at the length of the vector (ratio sigma_x, sigma_y)
-    of theoretical slips and along it. With a ratio far from one that direction is not the sliding one when all slides. None: no
-    F_x, and the slip ratio does not count.
+    the cornering stiffness. With it the same curve is used for combined slip: it is evaluated at the length of the vector
+    (ratio sigma_x, sigma_y) of theoretical slips, and the force points along this vector. If the ratio is far from one, that is
+    not the direction of sliding at full sliding. None: no F_x, and the slip ratio has no effect.
 
-    The curve's force at zero slip (shifts, camber) is scaled, and kept whatever the slip. Camber, speed and pressure reach the
-    wrapped tyre; moments are left out.
+    The curve's force at zero slip (shifts, camber) is scaled and kept at every slip. The wrapped tyre gets the contact's camber,
+    speed and pressure; moments are left out.
 
     **Raises** `InputError` for parameters that are not positive, a tyre with states, or a contact without a load.
     """
@@ -69,6 +69,6 @@ class Similarity(AbstractTyre):
         """Cornering stiffness over load, relative to its value at the reference load."""
         if self.stiffness_load is None:
             return 1.0
-        # sin(2 arctan(x)) = 2 x / (1 + x^2): the load cancels, so that none at all is an ordinary point.
+        # sin(2 arctan(x)) = 2 x / (1 + x^2): the load cancels, so that zero load is not a singular point.
         x, x_0 = load / self.stiffness_load, self.reference_load / self.stiffness_load
         return (1 + x_0**2) / (1 + x**2)

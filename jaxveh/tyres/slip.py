@@ -1,4 +1,4 @@
-"""Slips as vectors, and the part of a curve of pure slip that falls on one of their directions."""
+"""Slip vectors, and the component of a curve of pure slip in one direction."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from jaxveh import numerics
 from jaxveh.tyres.base import Contact
 
 LOCKED = 1e-3
-"""The least rolling speed over forward speed: a locked wheel slides a thousand times faster than it rolls."""
+"""The lower bound of the rolling speed over the forward speed: a locked wheel slides a thousand times faster than it rolls."""
 
 SMALLEST = 1e-5
-"""The least length of a slip vector: less than any curve of force over slip can tell from zero."""
+"""The least length of a slip vector, so small that no curve of force over slip distinguishes it from zero."""
 
 
 def theoretical(contact: Contact):
-    """`kappa / (1 + kappa)` and `tan(alpha) / (1 + kappa)`, positive like their forces; finite for a locked wheel."""
+    """`kappa / (1 + kappa)` and `tan(alpha) / (1 + kappa)`, with the signs of their forces; finite for a locked wheel."""
     s_x, s_y = practical(contact)
     rolls = jnp.maximum(1.0 + s_x, LOCKED)
     return s_x / rolls, s_y / rolls
 
 
 def practical(contact: Contact):
-    """`kappa` and `tan(alpha)`: sliding speed over forward speed, positive like their forces."""
+    """`kappa` and `tan(alpha)`: sliding speed over forward speed, with the signs of their forces."""
     if contact.lateral_slip is None:
         angle = contact.slip_angle + 0.0 * contact.slip_ratio
         return contact.slip_ratio + 0.0 * angle, numerics.tan(jnp.asarray(angle))
@@ -31,14 +31,14 @@ def practical(contact: Contact):
 
 
 def length(x, y):
-    """`sqrt(x^2 + y^2)`, smooth at zero, where it is `SMALLEST` instead: a division by it is safe."""
+    """`sqrt(x^2 + y^2)`, smooth at zero, where it is `SMALLEST`, so that one can divide by it."""
     return jnp.sqrt(x * x + y * y + SMALLEST**2)
 
 
 def share(curve, part, whole):
-    """What a curve of pure slip gives in a direction in which `part` of the slip `whole` points; zero for no part.
+    """The component of a curve of pure slip in the direction in which the slip of length `whole` has the component `part`.
 
-    `part / whole * (curve(whole) - curve(0))`, of the curve's other side (`-whole`) where the part is negative.
+    It is `part / whole * (curve(whole) - curve(0))`, with the curve's negative side (`-whole`) where the part is negative.
     """
     signed = jnp.where(part < 0, -whole, whole)
     return part / signed * (curve(signed) - curve(jnp.zeros_like(signed)))

@@ -1,4 +1,4 @@
-"""TMeasy: a tyre by the few numbers that can be read off a measured curve, at one load and at twice that load."""
+"""TMeasy: a tyre described by a few numbers that can be read off measured curves at one load and at twice that load."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
 from jaxveh.tyres.slip import theoretical
 
 MOST_LOAD = 3.0
-"""The load over the nominal one up to which the interpolation is followed."""
+"""The load over the nominal load up to which the interpolation is used."""
 
 LEAST_GRIP = 1e-6
-"""The least friction by which slips are divided: below it only the forces scale."""
+"""The lower bound of the friction by which slips are divided. Below it only the forces scale."""
 
 NO_SLIP = 1e-12
 """Below this normalised slip the direction is not resolved: its square would underflow in float32."""
@@ -28,8 +28,8 @@ NO_SLIP = 1e-12
 class TMeasyCurve(eqx.Module):
     """Force over slip in one direction at one load: rise, peak and sliding.
 
-    `initial_stiffness` dF_0 (N) the slope at zero slip, `F_max` (N) at the slip `s_max` (-), `F_slide` (N) from the slip
-    `s_slide` (-) on. Slips are theoretical: sliding speed over rolling speed.
+    `initial_stiffness` dF_0 (N) is the slope at zero slip. The force is `F_max` (N) at the slip `s_max` (-), and `F_slide` (N)
+    from the slip `s_slide` (-) on. Slips are theoretical: sliding speed over rolling speed.
 
     **Raises** `InputError` for numbers that are not positive, `s_slide` not above `s_max`, `F_slide` above `F_max`, or a slope
     below `2 F_max / s_max`, with which the curve would turn the wrong way before its peak.
@@ -45,13 +45,13 @@ class TMeasyCurve(eqx.Module):
         check_parameters(self)
         _check_greater("TMeasyCurve.s_slide", self.s_slide, self.s_max, "greater than s_max")
         _check_at_most("TMeasyCurve.F_slide", self.F_slide, self.F_max, "at most F_max")
-        # Exactly 2 F_max / s_max is allowed, in whatever precision it was computed.
+        # A slope of exactly 2 F_max / s_max is allowed, in whatever precision it was computed.
         least = 2 * self.F_max / self.s_max * (1 - 1e-6)
         _check_greater("TMeasyCurve.initial_stiffness", self.initial_stiffness, least, "at least 2 F_max / s_max")
 
 
 class _Numbers(NamedTuple):
-    """The numbers of a curve in between: of one load, or of one direction."""
+    """The numbers of an interpolated curve: at one load or in one direction."""
 
     initial_stiffness: Any
     s_max: Any
@@ -61,7 +61,9 @@ class _Numbers(NamedTuple):
 
 
 class TMeasyTrail(eqx.Module):
-    """The pneumatic trail over the lateral slip: `start` (m) at zero slip, zero at the slip `s_zero`, gone at `s_end` (-).
+    """The pneumatic trail over lateral slip.
+
+    `start` (m, at zero slip), `s_zero` (-, the slip of its first zero), `s_end` (-, the slip from which on it is zero).
 
     **Raises** `InputError` for numbers that are not positive, or `s_end` not above `s_zero`.
     """
@@ -75,7 +77,7 @@ class TMeasyTrail(eqx.Module):
         _check_greater("TMeasyTrail.s_end", self.s_end, self.s_zero, "greater than s_zero")
 
     def __call__(self, slip):
-        """The trail, m, at a lateral slip of any shape: a line and a parabola mixed, then a little negative, then zero."""
+        """The trail, m, at a lateral slip of any shape: a blend of a line and a cubic, then slightly negative, then zero."""
         slip = jnp.abs(slip)
         mix = self.s_zero / self.s_end
         x = jnp.minimum(slip / self.s_zero, 1.0)
@@ -88,29 +90,30 @@ class TMeasyTrail(eqx.Module):
 class TMeasy(AbstractTyre):
     """TMeasy in combined slip (G. Rill, Road Vehicle Dynamics: Fundamentals and Modeling, CRC Press, 2012, ch. 3).
 
-    `longitudinal`, `lateral` the curves at the `nominal_load` (N); `twice_longitudinal`, `twice_lateral` those at twice that
-    load (None: forces and slopes double, slips stay); `trail` a `TMeasyTrail` (None: no aligning moment).
+    `longitudinal`, `lateral`: the curves at the `nominal_load` (N). `twice_longitudinal`, `twice_lateral`: the curves at twice
+    that load (None: forces and slopes double, slips stay the same). `trail`: the pneumatic trail (None: no aligning moment).
 
-    - Load: forces and slopes by the parabola through zero and both loads, slips by the line through both; from three nominal
-      loads on, forces grow with the load alone.
-    - Friction: forces, slips of the curve and of the trail scale with the contact's friction, slopes stay.
-    - Each curve: `F = dF_0 s / (1 + q (q + dF_0 s_max / F_max - 2))` with `q = s / s_max` up to the peak, then a way down, then
-      F_slide: smooth to the first derivative.
-    - `after_peak`, the way down: `cubic` (the default, as the book of 2012 has it) is
+    - Load: forces and slopes lie on the parabola through zero and both loads, slips on the line through both loads. From three
+      nominal loads on, forces are proportional to the load.
+    - Friction: forces and the slips of the curve and of the trail scale with the contact's friction; slopes stay the same.
+    - Each curve: `F = dF_0 s / (1 + q (q + dF_0 s_max / F_max - 2))` with `q = s / s_max` up to the peak, then a falling part,
+      then F_slide, with a continuous first derivative.
+    - `after_peak`, the falling part: `cubic` (the default, as in the book of 2012) is
       `F_max - (F_max - F_slide) t^2 (3 - 2 t)` with `t = (s - s_max) / (s_slide - s_max)`. `parabolas` (G. Rill & A. Arrieta
       Castro, Road Vehicle Dynamics: Fundamentals and Modeling with MATLAB, 2nd ed., CRC Press, 2020, ch. 3, and tools such as
       Project Chrono) is `F_max - a (s - s_max)^2` up to `s_* = s_max + (F_max - F_slide) / (a (s_slide - s_max))`, then
       `F_slide + b (s_slide - s)^2` with `b = a (s_* - s_max) / (s_slide - s_*)`; `a = F_max^2 / (dF_0 s_max^3)` makes the second
-      derivative one at the peak. Where s_* is beyond s_slide the parabolas do not fit, and it is the cubic: in combined slip
-      the force can jump at the direction where they cease to.
+      derivative continuous at the peak. Where s_* is beyond s_slide the parabolas do not fit, and the cubic is used. In combined
+      slip the force can jump at the direction where this changes.
     - Combined: slips are divided by `s_x_max / (s_x_max + s_y_max) + (F_x_max / dF_x0) / (F_x_max / dF_x0 + F_y_max / dF_y0)`,
-      and likewise for y; the curve along their direction has numbers on the ellipses between both, its force that direction.
+      and likewise for y. The curve for the direction of the normalised slip has its numbers on the ellipses between the two
+      curves, and the force points in that direction.
 
-    Where both directions differ in slope over normalised slip the force has no total derivative at zero slip (it is a cone):
-    the derivatives there are those along each direction.
+    If the slopes over normalised slip differ between the directions, the force has no total derivative at zero slip (it is a
+    cone). The derivatives there are those along each direction.
 
-    **Raises** `InputError` for curves that cannot be followed from zero to three nominal loads, an unknown `after_peak`, or a
-    contact without a load.
+    **Raises** `InputError` for curves that are invalid at zero or three nominal loads, an unknown `after_peak`, or a contact
+    without a load.
     """
 
     longitudinal: TMeasyCurve
@@ -133,7 +136,7 @@ class TMeasy(AbstractTyre):
         ratio = jnp.minimum(load / self.nominal_load, MOST_LOAD)
         x = _at_load(self.longitudinal, self.twice_longitudinal, ratio)
         y = _at_load(self.lateral, self.twice_lateral, ratio)
-        # Friction m scales slips and forces of the curves alike: F(s) = m F_1(s / m).
+        # The friction m scales slips and forces of the curves equally: F(s) = m F_1(s / m).
         limit = contact.friction * (load / self.nominal_load)
         grip = jnp.maximum(contact.friction * jnp.ones_like(load), LEAST_GRIP)
         slip_x, slip_y = (slip / grip for slip in theoretical(contact))
@@ -144,7 +147,7 @@ class TMeasy(AbstractTyre):
 
 
 def _combined_forces(x: _Numbers, y: _Numbers, slip_x, slip_y, after_peak):
-    """Forces along both slips, each in the unit of the curves' forces."""
+    """The forces in both directions, in the unit of the curves' forces."""
     peaks, bends = x.s_max + y.s_max, x.F_max / x.initial_stiffness + y.F_max / y.initial_stiffness
     norm_x = x.s_max / peaks + x.F_max / x.initial_stiffness / bends
     norm_y = y.s_max / peaks + y.F_max / y.initial_stiffness / bends
@@ -184,7 +187,7 @@ def _cubic(curve: _Numbers, slip):
 
 
 def _parabolas(curve: _Numbers, slip):
-    """The force between `s_max` and `s_slide` by two parabolas that meet in value and slope, the cubic where they cannot."""
+    """The force between `s_max` and `s_slide`: two parabolas that meet in value and slope, or the cubic where they cannot."""
     stiffness, s_max, F_max, s_slide, F_slide = curve
     bend = F_max**2 / (stiffness * s_max**3)
     meet = s_max + (F_max - F_slide) / (bend * (s_slide - s_max))
@@ -199,7 +202,8 @@ AFTER_PEAK = {"cubic": _cubic, "parabolas": _parabolas}
 
 
 def _at_load(one: TMeasyCurve, two: TMeasyCurve | None, ratio) -> _Numbers:
-    """The curve at a load over the nominal one, its forces and slopes divided by that ratio: finite without load."""
+    """The curve at a `ratio` of load over nominal load. Forces and slopes are divided by the ratio, so that they are finite at
+    zero load."""
     numbers = _Numbers(*(getattr(one, name) for name in _Numbers._fields))
     if two is None:
         return numbers
@@ -220,13 +224,13 @@ def _check_at_most(name: str, value, other, allowed: str) -> None:
 
 
 def _check_loads(name: str, one: TMeasyCurve, two: TMeasyCurve | None) -> None:
-    """All is linear in the load but for a common factor: what holds at both ends holds between."""
+    """Check the curves at both ends of the loads: but for a common factor all is linear in the load, so they hold between."""
     if two is None:
         return
     for ratio in (0.0, MOST_LOAD):
         at, advice = (
             _at_load(one, two, ratio),
-            f"So the curve comes out at {ratio:g} nominal loads: look at both loads' {{}}.",
+            f"This is the interpolated curve at {ratio:g} nominal loads: check {{}} of both loads.",
         )
         for field, value in at._asdict().items():
             check_positive(f"{name}: {field}", value, advice=advice.format(field))

@@ -1,4 +1,4 @@
-"""What tyres with a stiffness along, a stiffness across and one friction share."""
+"""The common part of tyres with two stiffnesses, longitudinal and lateral, and one friction."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jaxveh.tyres.base import AbstractTyre, Contact, need_load
 
 
 class AbstractTwoStiffnesses(AbstractTyre):
-    """A tyre of `slip_stiffness` (N), `cornering_stiffness` (N/rad) and `friction` (-; default 1), the same in all directions."""
+    """A tyre with `slip_stiffness` (N), `cornering_stiffness` (N/rad) and `friction` (-; default 1, equal in all directions)."""
 
     slip_stiffness: jax.Array = positive("N")
     cornering_stiffness: jax.Array = positive("N/rad")
@@ -23,6 +23,6 @@ class AbstractTwoStiffnesses(AbstractTyre):
         return self.friction * contact.friction * need_load(contact, type(self).__name__)
 
     def unbounded_force(self, sigma_x: Any, sigma_y: Any) -> tuple[Any, Any, Any]:
-        """The force that the stiffnesses alone would make of slips, N: along, across, and its size."""
+        """The force without a friction limit, N: its longitudinal and lateral component and its magnitude."""
         F_x, F_y = self.slip_stiffness * sigma_x, self.cornering_stiffness * sigma_y
         return F_x, F_y, numerics.hypot(F_x, F_y)

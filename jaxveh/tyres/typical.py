@@ -1,4 +1,4 @@
-"""Tyres to start from where nothing but size and load is known."""
+"""Tyres to start from if only size and load are known."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.mf_tyre.typical import TYPICAL_COEFFICIENTS
 
 SLIP_RATIO = 1.5
-"""Beyond it slip ratios are held, as in most property files."""
+"""The limit of the slip ratio in both directions, as in most property files."""
 
 
 def typical_mf_tyre(
     load, *, version: int = 61, pressure=220000.0, radius=0.32, speed=16.7, limits: bool = True
 ) -> MFTyre:
-    """A typical car tyre as MF-Tyre `version` (52, 61 or 62): a start for fits, no tyre that anybody measured.
+    """A typical car tyre as MF-Tyre `version` (52, 61 or 62): a start for fits, not a measured tyre.
 
-    `load` (N) is its nominal load, `pressure` (Pa) its nominal and inflation pressure, `radius` (m) the unloaded one, `speed`
-    (m/s) that at which it counts as measured; `limits` as in `MFTyre`. Coefficients are those which a property file means
-    where it is silent (`mf_tyre.typical.TYPICAL_COEFFICIENTS`); forces scale with the load.
+    `load` (N) is its nominal load, `pressure` (Pa) its nominal and inflation pressure, `radius` (m) its unloaded radius, `speed`
+    (m/s) its nominal measurement speed LONGVL; `limits`: as in `MFTyre`. The coefficients are the defaults of a property file,
+    `mf_tyre.typical.TYPICAL_COEFFICIENTS`; forces scale with the load.
 
-    **Raises** `InputError` for numbers that are not positive, and for another version.
+    **Raises** `InputError` for numbers that are not positive, and for an unknown version.
     """
     for name, value, unit in (
         ("load", load, "N"), ("pressure", pressure, "Pa"), ("radius", radius, "m"), ("speed", speed, "m/s"),

@@ -1,4 +1,4 @@
-"""UniTire: one exponential of the normalised slip for every load, friction and direction."""
+"""UniTire: one exponential of the normalised slip for all loads, frictions and directions."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from jaxveh.tyres.slip import theoretical
 from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
 
 SATURATED = 40.0
-"""The normalised slip from which on the exponential is zero in float64, whatever E."""
+"""The normalised slip from which on the exponential is zero in float64, for any E."""
 
 
 class UniTire(AbstractTwoStiffnesses):
     """UniTire in combined slip (K. Guo & D. Lu, UniTire: unified tire model, Vehicle System Dynamics 45 S1, 2007, 79-99).
 
-    `slip_stiffness` K_x (N), `cornering_stiffness` K_y (N/rad), `friction` (-), `E` (-; default 0) the curvature factor.
+    `slip_stiffness` K_x (N), `cornering_stiffness` K_y (N/rad), `friction` (-), curvature factor `E` (-; default 0).
     With theoretical slips sigma and the normalised slip `phi = |K sigma| / (mu F_z)` the force is
     `mu F_z (1 - exp(-phi - E phi^2 - (E^2 + 1/12) phi^3))` along `K sigma`; it rises with phi for every E.
 
-    The steady, speed-independent form: friction is one number for both directions (the source lets it fall with sliding
-    speed), K and E do not follow the load, and the direction is that of the normalised slips at every slip.
+    This is the steady, speed-independent form: friction is one number for both directions (in the source it falls with sliding
+    speed), K and E do not depend on the load, and the force always has the direction of the normalised slips.
 
     **Raises** `InputError` for stiffnesses or friction that are not positive, or a contact without a load.
     """

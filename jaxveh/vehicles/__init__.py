@@ -1,4 +1,4 @@
-"""Equations of motion and outputs of one vehicle at one instant; named parameter sets."""
+"""Equations of motion and outputs of one vehicle at one instant, and named parameter sets."""
 
 from jaxveh.vehicles import kit, sets
 from jaxveh.vehicles.anti_lock import AntiLock

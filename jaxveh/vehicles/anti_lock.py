@@ -1,4 +1,4 @@
-"""Any car with brakes whose wheels an anti-lock system keeps from locking."""
+"""Any car with brakes, with an anti-lock system."""
 
 from __future__ import annotations
 
@@ -23,26 +23,27 @@ OWN = (*SHARES, *WISHES)
 
 
 class AntiLock(AbstractVehicle):
-    """`vehicle` whose brakes an anti-lock system lets go, wheel by wheel, as a wheel slips too much.
+    """`vehicle` with an anti-lock system that releases the brake of each wheel whose slip is too large.
 
-    Of the brake torque that the driver asks for a wheel gets the share p (-, 1 when nothing is wrong), which follows with the
-    pressure's `lag` what the control wants, q; both are states of the wheel, `brake_share` and `brake_wish`:
+    Each wheel gets the share p (-, 1 in normal braking) of the brake torque demanded by the driver. The share follows the share
+    q demanded by the controller with the `lag` of the brake pressure. Both are states of the wheel, `brake_share` and
+    `brake_wish`:
 
         dq/dt = build (1 - q) (1 - s) - release q s,    dp/dt = (q - p) / lag
         s     = smooth_step((slip - slip_low) / (slip_high - slip_low)) smooth_step(v_x / slowest - 1),   slip = -slip ratio
 
-    so that a wheel braked beyond its tyre's peak goes round: build-up, peak, release, spin-up, about three times a second, with
-    slips from a few per cent to twice `slip_high` on ice (M. Burckhardt, Fahrwerktechnik: Radschlupf-Regelsysteme, 1993, has
-    these phases; ours are smooth, without the valves' steps). The slip is the true one: how a control unit finds it is a
-    matter of its own.
+    A wheel braked beyond the peak of its tyre then cycles through build-up, peak, release and spin-up about three times a
+    second, with slips from a few per cent to twice `slip_high` on ice (M. Burckhardt, Fahrwerktechnik: Radschlupf-Regelsysteme,
+    1993, describes these phases; here they are smooth, without the steps of valves). The slip is the true one; its estimation
+    by a control unit is not modelled.
 
-    **Parameters**: `slip_low`, `slip_high` (-), `build` and `release` (1/s), `lag` (s), `slowest` (m/s): below it the system is
-    off, above twice it works whole.
+    **Parameters**: `slip_low`, `slip_high` (-), `build` and `release` (1/s), `lag` (s), `slowest` (m/s, below which the system
+    is off; it is fully on above twice this speed).
 
-    **Inputs**: those of `vehicle`. Outputs gain `brake_torque_fl` ... (N m, those that the brakes have) and `brake_torque`,
-    their sum, and the shares.
+    **Inputs**: those of `vehicle`. The outputs also have `brake_torque_fl` ... (N m, the actual brake torques), their sum
+    `brake_torque`, and the shares.
 
-    **Raises** `InputError` for a vehicle without a `drive` or without slip ratios, or parameters outside their domain.
+    **Raises** `InputError` for a vehicle without a `drive` or without wheel spin, or parameters outside their domain.
     """
 
     vehicle: AbstractVehicle
@@ -58,7 +59,7 @@ class AntiLock(AbstractVehicle):
             self.vehicle, "wheel_inertia"
         ):
             raise InputError(
-                f"AntiLock.vehicle = {type(self.vehicle).__name__}: must be a car whose wheels spin, with a drive, such as a "
+                f"AntiLock.vehicle = {type(self.vehicle).__name__}: must be a car with a drive and with wheel spin, such as a "
                 "SevenDOF or a FourteenDOF."
             )
         check_parameters(self)
@@ -70,7 +71,7 @@ class AntiLock(AbstractVehicle):
 
     @property
     def state_type(self):
-        """The vehicle's; `brake_share_fl` ... and `brake_wish_fl` ... at its end."""
+        """The states of the vehicle, then `brake_share_fl` ... and `brake_wish_fl` ..."""
         return record_type("AntiLockState", (*self.vehicle.state_type._fields, *OWN))
 
     @property
@@ -86,7 +87,7 @@ class AntiLock(AbstractVehicle):
         return self.vehicle.motion(self._inner(x), u)
 
     def start(self, t, u, **values):
-        """The vehicle's start, all brakes free to work."""
+        """The vehicle's start with no brake released."""
         check_names("start", values, self.state_type._fields)
         inner = self.vehicle.start(t, u, **{k: v for k, v in values.items() if k not in OWN})
         one = jnp.ones_like(inner[0])
@@ -115,7 +116,7 @@ class AntiLock(AbstractVehicle):
 
 
 class _Held(AbstractDrive):
-    """The torques of an instant, whatever the inputs."""
+    """A drive with constant torques, those of one instant."""
 
     inputs: tuple[str, ...] = eqx.field(static=True)
     drive: Wheels

@@ -1,4 +1,4 @@
-"""The one contract of a vehicle: state, inputs and ground at one instant go in, rates and outputs come out."""
+"""The interface of all vehicles: from state, inputs and ground at one instant to state derivatives and outputs."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ GRAVITY = 9.80665
 
 
 class Motion(NamedTuple):
-    """How a car moves, without any force: what a driver sees, and what carries it along the road.
+    """The motion of a car, without forces: the quantities that a driver model sees and that move the car along the road.
 
-    World position `x`, `y` (m) of the point that the speeds belong to (the centre of gravity, unless the vehicle says
-    otherwise), zero for a car that does not know it; `yaw` (rad, unwrapped); `v_x`, `v_y` (m/s) in the car's directions;
-    `yaw_rate` (rad/s).
+    `x`, `y` (m): world position of the reference point of the speeds (the centre of gravity, unless the vehicle documents
+    another), zero for a vehicle without a position. `yaw` (rad, unwrapped), `v_x`, `v_y` (m/s, in the car's axes), `yaw_rate`
+    (rad/s).
     """
 
     x: Any
@@ -35,22 +35,22 @@ class Motion(NamedTuple):
 
 
 OVER_GROUND = {"speed": "m/s", "course": "rad"}
-"""Units of what `over_ground` says."""
+"""The units of the results of `over_ground`."""
 
 
 def over_ground(yaw: Any, v_x: Any, v_y: Any) -> dict[str, Any]:
-    """The velocity over ground as satellites tell it: its magnitude `speed` (m/s), and its direction `course` (rad) from the
-    world's x axis, `yaw + atan2(v_y, v_x)`, that of the yaw at standstill. It goes on with the yaw, which is unwrapped, and
-    jumps by a turn where the car slides backwards; backwards it is the direction in which the car goes."""
+    """The velocity over ground as satellite receivers measure it: its magnitude `speed` (m/s) and its direction `course` (rad)
+    from the world's x axis, `yaw + atan2(v_y, v_x)`. At standstill the course is the yaw. It is unwrapped like the yaw, but jumps
+    by a full turn where v_y changes sign in backward travel; in backward travel it is the direction of travel."""
     return {"speed": numerics.hypot(v_x, v_y), "course": yaw + numerics.arctan2(v_y, v_x)}
 
 
 SHARED = "**Parameters** of "
-"""How a paragraph on parameters begins that is meant for all classes below."""
+"""The beginning of a docstring's paragraph on parameters that all subclasses share."""
 
 
 def with_shared_parameters(kind: type) -> str:
-    """The docstring of a class, with its bases' paragraphs on shared parameters before the one on inputs, or at the end."""
+    """The docstring of a class with the paragraphs of its bases on shared parameters, before the one on inputs or at the end."""
     paragraphs = (kind.__doc__ or "").rstrip().split("\n\n")
     shared = [
         part
@@ -63,14 +63,15 @@ def with_shared_parameters(kind: type) -> str:
 
 
 class AbstractVehicle(WithParameters, eqx.Module):
-    """Equations of motion of one vehicle: array leaves are parameters, states and inputs are NamedTuples of scalars.
+    """The equations of motion of one vehicle: array leaves are parameters, states and inputs are NamedTuples of scalars.
 
-    Written for one instant and elementwise: a batch of vehicles, states or parameters has arrays in the fields. Axes
-    of ISO 8855 (x forward, y left, z up; yaw, yaw rate and steer positive to the left), SI units. Speeds and accelerations
-    are those of the centre of gravity in the intermediate axes, which lie in the road's plane and turn with the car.
+    The equations hold at one instant and are elementwise: for a batch of vehicles, states or parameters the fields are arrays.
+    Axes are those of ISO 8855 (x forward, y left, z up; yaw, yaw rate and steer positive to the left), units are SI. Speeds and
+    accelerations are those of the centre of gravity in the intermediate axes, which lie in the road's plane and turn with the
+    car.
 
-    Parameters that several vehicles share are declared by abstract classes, whose docstrings say of what in a paragraph that
-    begins with `SHARED`; the docstring of a vehicle gets these paragraphs, so that `help` shows all.
+    Abstract classes declare the parameters that several vehicles share. Each describes them in a paragraph of its docstring that
+    begins with `SHARED`. The docstring of a vehicle includes these paragraphs, so that `help` shows all parameters.
     """
 
     drawn_by = "car"
@@ -84,17 +85,17 @@ class AbstractVehicle(WithParameters, eqx.Module):
     @property
     @abc.abstractmethod
     def inputs(self) -> tuple[str, ...]:
-        """The fields that `u` must have."""
+        """The fields that the inputs `u` must have."""
 
     @property
     @abc.abstractmethod
     def state_type(self) -> Any:
-        """The state's NamedTuple class."""
+        """The NamedTuple class of the state."""
 
     @property
     @abc.abstractmethod
     def units(self) -> dict[str, str]:
-        """Units of states, inputs and outputs by name."""
+        """The units of states, inputs and outputs by name."""
 
     @abc.abstractmethod
     def start(self, t: Any, u: Any, **values: Any) -> Any:
@@ -102,16 +103,16 @@ class AbstractVehicle(WithParameters, eqx.Module):
 
     @abc.abstractmethod
     def evaluate(self, t: Any, x: Any, u: Any, ground: Ground = LEVEL) -> tuple[Any, Any]:
-        """The state's time derivative (the state's NamedTuple) and the outputs (a NamedTuple), forces computed once."""
+        """The state's time derivative (the same NamedTuple) and the outputs (a NamedTuple); forces are computed only once."""
 
     @abc.abstractmethod
     def motion(self, x: Any, u: Any) -> Motion:
-        """How the car moves; needs no tyre force."""
+        """The motion of the car, for which no tyre force is needed."""
 
     @property
     def wheel_positions(self) -> tuple[tuple[Any, Any], ...]:
-        """Where the wheels (front left, front right, rear left, rear right) touch the road: (x, y) in m from the point of
-        `motion`, in the car's directions; all in that point for a car without wheels."""
+        """The contact points of the wheels (front left, front right, rear left, rear right): (x, y) in m from the reference
+        point of `motion`, in the car's axes. Without wheels all lie in that point."""
         return ((0.0, 0.0),) * 4
 
     def derivatives(self, t: Any, x: Any, u: Any, ground: Ground = LEVEL) -> Any:
@@ -119,12 +120,12 @@ class AbstractVehicle(WithParameters, eqx.Module):
         return self.evaluate(t, x, u, ground)[0]
 
     def outputs(self, t: Any, x: Any, u: Any, ground: Ground = LEVEL) -> Any:
-        """Everything that can be said about the vehicle at this instant, a NamedTuple."""
+        """All outputs of the vehicle at this instant, a NamedTuple."""
         return self.evaluate(t, x, u, ground)[1]
 
 
 def with_batch_shape(outputs: Any) -> Any:
-    """The same NamedTuple, each field with the shape of all: a number or a parameter stands for the whole batch."""
+    """The same NamedTuple with all fields broadcast to a common shape: numbers and parameters are repeated for the batch."""
     leaves = jax.tree.leaves(outputs)
     shape = jnp.broadcast_shapes(*[jnp.shape(leaf) for leaf in leaves])
     dtype = jnp.result_type(*[leaf for leaf in leaves if hasattr(leaf, "dtype")])
@@ -133,7 +134,7 @@ def with_batch_shape(outputs: Any) -> Any:
 
 
 def given_or_zero(state_type: Any, values: dict[str, Any], like: Any, parameter: Any) -> Any:
-    """A state with `values` by name, all else zero in the shape of `like`; of the float type of a `parameter`.
+    """A state with `values` by name and zeros of the shape of `like` in all other fields, with the dtype of a `parameter`.
 
     **Raises** `InputError` for names that the state does not have.
     """

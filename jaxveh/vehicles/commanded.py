@@ -1,4 +1,4 @@
-"""Any vehicle at a given steer and speed, driven by steering rate and acceleration instead."""
+"""Any vehicle with the inputs steer and speed, commanded by steering rate and acceleration instead."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jaxveh.vehicles.wheels import gravity
 
 OWN = ("steer", "v_x")
 KNOWN = (*OWN, "a_x", "v_x_rate", "steer_rate")
-"""The inputs that a commanded vehicle may have."""
+"""The inputs that the vehicle inside a `Commanded` may have."""
 
 
 class Commanded(AbstractVehicle):
@@ -22,15 +22,14 @@ class Commanded(AbstractVehicle):
 
         dsteer/dt = steer_rate,    dv_x/dt = acceleration
 
-    Both within `steer_limits` and `acceleration_limits` where these are given. A vehicle that asks for `v_x_rate` or
-    `steer_rate` gets the limited ones, one that asks for `a_x` what an accelerometer says, `dv_x/dt - v_y yaw_rate` less
-    gravity along the road.
+    Both are limited by `steer_limits` and `acceleration_limits` if these are given. If the vehicle has the inputs `v_x_rate` or
+    `steer_rate`, they are the limited ones. If it has the input `a_x`, that is the signal of an accelerometer,
+    `dv_x/dt - v_y yaw_rate` less gravity along the road.
 
-    **Inputs**: `steer_rate` (rad/s at the road wheels) and `acceleration` (m/s^2). Outputs gain those of `steer`, `steer_rate`
-    and `v_x_rate` that the vehicle does not have, limits applied.
+    **Inputs**: `steer_rate` (rad/s at the road wheels) and `acceleration` (m/s^2). The outputs also have `steer`, `steer_rate`
+    and `v_x_rate`, with limits applied, unless the vehicle has them itself.
 
-    **Raises** `InputError` for a vehicle without the inputs `steer` and `v_x`, or with others than those and `a_x`, `v_x_rate`,
-    `steer_rate`.
+    **Raises** `InputError` unless the vehicle has the inputs `steer` and `v_x`, and optionally `a_x`, `v_x_rate`, `steer_rate`.
     """
 
     vehicle: AbstractVehicle
@@ -42,7 +41,7 @@ class Commanded(AbstractVehicle):
         if not set(OWN) <= set(inputs) <= set(KNOWN):
             raise InputError(
                 f"Commanded.vehicle has the inputs {', '.join(inputs)}: "
-                "must be steer and v_x, and of a_x, v_x_rate, steer_rate those that it needs."
+                "must be steer and v_x, and optionally a_x, v_x_rate, steer_rate."
             )
 
     @property
@@ -51,7 +50,7 @@ class Commanded(AbstractVehicle):
 
     @property
     def state_type(self):
-        """`steer`, `v_x`, then the vehicle's."""
+        """`steer`, `v_x`, then the states of the vehicle."""
         return record_type("CommandedState", (*OWN, *self.vehicle.state_type._fields))
 
     @property
@@ -91,7 +90,7 @@ class Commanded(AbstractVehicle):
         return steer_rate, wished if limits is None else limits.limit(x.v_x, wished)
 
     def _inputs(self, x, u, ground: Ground):
-        """What the vehicle is told."""
+        """The inputs of the vehicle inside."""
         steer_rate, v_x_rate = self._limit_commands(x, u)
         known = {"steer": x.steer, "v_x": x.v_x, "a_x": v_x_rate, "v_x_rate": v_x_rate, "steer_rate": steer_rate}
         told = record("CommandedInputs", {name: known[name] for name in self.vehicle.inputs})

@@ -1,4 +1,4 @@
-"""Who turns the wheels: from the driver's torques to each wheel's."""
+"""Drives: from the driver's torques to the torques of the wheels."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from jaxveh.vehicles.wheels import Wheels, front_rear, wheel_names, wheels_of
 
 
 class AbstractDrive(eqx.Module):
-    """From inputs to torques at the wheels (N m): `drive` turns a wheel forwards where positive, `brake` slows it down."""
+    """A drive: from the inputs to the driving and braking torques of the wheels (N m)."""
 
     inputs: eqx.AbstractVar[tuple[str, ...]]
 
     @abc.abstractmethod
     def torques(self, u: Any) -> tuple[Wheels, Wheels]:
-        """Driving torque (of either sign) and braking torque (at least zero, against the rotation) of each wheel, N m."""
+        """The driving torque (positive forwards, of either sign) and the braking torque (at least zero, against the rotation) of
+        each wheel, N m."""
 
 
 class AxleDrive(AbstractDrive):
-    """One engine and open differentials: `drive_torque` and `brake_torque` are sums over the wheels (N m).
+    """One engine with open differentials: `drive_torque` and `brake_torque` are sums over the wheels (N m).
 
-    `front_drive` and `front_brake` (-) are the front axle's shares: 1 drives or brakes the front wheels alone. Within an
-    axle both wheels get the same.
+    `front_drive` and `front_brake` (-) are the front axle's shares: with 1 only the front wheels are driven or braked. The two
+    wheels of an axle get equal torques.
 
     **Raises** `InputError` for a share outside 0 to 1.
     """
@@ -49,7 +50,7 @@ class AxleDrive(AbstractDrive):
 
 
 class FourMotors(AbstractDrive):
-    """A motor a wheel: `torque_fl`, `torque_fr`, `torque_rl`, `torque_rr` (N m), negative where the motor brakes."""
+    """One motor per wheel: `torque_fl`, `torque_fr`, `torque_rl`, `torque_rr` (N m), negative if the motor brakes."""
 
     inputs: ClassVar[tuple[str, ...]] = wheel_names("torque")
 
@@ -58,10 +59,10 @@ class FourMotors(AbstractDrive):
 
 
 class AbstractDriven(AbstractVehicle):
-    """A car that torques drive and brake.
+    """A car driven and braked by torques.
 
     **Parameters** of the drive: `wheel_radius` (m, effective), `drag` (N s^2/m^2, half the air's density times c_d times the
-    area), `rolling_resistance` (-), `drive`, who turns the wheels (`AxleDrive`, `FourMotors`).
+    area), `rolling_resistance` (-), `drive`, the distribution of torques to the wheels (`AxleDrive`, `FourMotors`).
     """
 
     _: KW_ONLY

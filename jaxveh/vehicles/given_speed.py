@@ -1,4 +1,4 @@
-"""What a car whose forward speed is an input knows of its acceleration."""
+"""Cars whose forward speed is an input, and their longitudinal acceleration."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from jaxveh.vehicles.two_track import AbstractLoadedTwoTrack
 
 
 def longitudinal_acceleration(x: Any, u: Any, g_x: Any = 0.0) -> Any:
-    """What an ideal accelerometer at the centre of gravity says along x, m/s^2.
+    """The signal of an ideal accelerometer at the centre of gravity along x, m/s^2.
 
-    The input `a_x` where there is one, else `dv_x/dt - v_y r - g_x` with the input `v_x_rate`; the speed is constant if nobody
-    says. `g_x` (m/s^2) is gravity along a sloping road.
+    It is the input `a_x` if there is one, otherwise `dv_x/dt - v_y r - g_x` with the input `v_x_rate`. With neither input the
+    speed is assumed constant. `g_x` (m/s^2) is gravity along a sloping road.
     """
     if hasattr(u, "a_x"):
         return u.a_x

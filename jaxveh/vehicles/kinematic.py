@@ -1,4 +1,4 @@
-"""The kinematic single track: wheels that roll where they point."""
+"""The kinematic single-track model: wheels without slip."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class KinematicState(NamedTuple):
 
 
 class KinematicOutputs(NamedTuple):
-    """What can be said without forces, at the reference point: speeds m/s, angles rad, rates rad/s, accelerations m/s^2.
+    """The kinematic outputs at the reference point: speeds m/s, angles rad, rates rad/s, accelerations m/s^2.
 
-    `a_x` and `a_y` are those of an ideal accelerometer in a turn of constant speed and steer; `sideslip` is that of the steer,
-    forwards and backwards alike, at standstill too; `curvature` (1/m) is the yaw rate over `v_x`, that of the rear axle's path
-    where the rear axle is not steered; `speed` and `course` are over ground.
+    `a_x` and `a_y` are the signals of an ideal accelerometer in a turn of constant speed and steer. `sideslip` follows from the
+    steer, in the same way forwards, backwards and at standstill. `curvature` (1/m) is the yaw rate over `v_x`, which is the
+    curvature of the rear axle's path if the rear axle is not steered. `speed` and `course` are over ground.
     """
 
     v_x: Any
@@ -52,7 +52,7 @@ UNITS = {
 
 
 class AbstractKinematic(AbstractSteeredByRoadWheels):
-    """A car whose wheels do not slip, steered at a given speed.
+    """A car without wheel slip, steered at a given speed.
 
     **Raises** `InputError` for parameters outside their domain.
     """
@@ -67,12 +67,12 @@ class AbstractKinematic(AbstractSteeredByRoadWheels):
         return (*self.steering.inputs, "v_x")
 
     def curvature(self, u: Any) -> Any:
-        """Yaw rate over `v_x`, 1/m: that of the rear axle's path where this axle is not steered."""
+        """The yaw rate over `v_x`, 1/m: the curvature of the rear axle's path if this axle is not steered."""
         front, rear = self._tangents(u)
         return (front if is_straight(rear) else front - rear) / self.wheelbase
 
     def rear_aside(self, u: Any) -> Any:
-        """Lateral over forward speed at the rear axle (-); 0.0 where it is not steered."""
+        """The lateral over the forward speed at the rear axle (-); 0.0 if it is not steered."""
         return self._tangents(u)[1]
 
     def _tangents(self, u: Any) -> tuple[Any, Any]:
@@ -81,19 +81,19 @@ class AbstractKinematic(AbstractSteeredByRoadWheels):
 
 
 class Kinematic(AbstractKinematic):
-    """A single track whose wheels do not slip: true at walking speed, and the usual car of path planning.
+    """A single track without wheel slip: accurate at walking speed, and the usual model for path planning.
 
-    With delta_f and delta_r the angles of the axles, L the wheelbase and d how far the reference point lies ahead of the rear
+    With delta_f and delta_r the angles of the axles, L the wheelbase and d the distance of the reference point ahead of the rear
     axle (R. Rajamani, Vehicle Dynamics and Control, 2nd ed., sec. 2.2, with v_x along the car instead of the speed along the
     path):
 
         dyaw/dt = v_x (tan(delta_f) - tan(delta_r)) / L,    v_y = v_x tan(delta_r) + d dyaw/dt,    sideslip = atan(v_y / v_x)
 
-    **Parameters**: `wheelbase` (m), `rear_axle_to_reference` d (m): the point that position and speeds belong to, 0 for the rear
-    axle, the distance of the axle from the centre of gravity for the latter.
+    **Parameters**: `wheelbase` (m), `rear_axle_to_reference` (m, the distance d of the reference point of position and speeds
+    ahead of the rear axle; 0: the rear axle itself).
 
-    **Inputs**: those of `steering` (`steer`, rad at the road wheels) and `v_x` (m/s), the same at every point of the car's
-    middle.
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels) and `v_x` (m/s), which is the same at all points of the
+    car's longitudinal axis.
 
     **Raises** `InputError` for parameters outside their domain.
     """

@@ -1,4 +1,4 @@
-"""The linear single track that becomes kinematic at a crawl."""
+"""The linear single-track model that is kinematic at crawl speed."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from jaxveh.vehicles.linear_handling import LinearSingleTrack
 
 
 class KinematicCrawl(AbstractVehicle):
-    """`vehicle` whose wheels do not slip below the speed `below` (m/s, 0.1 by default): CommonRoad's ST model (Althoff &
-    Würsching, CommonRoad: Vehicle Models, 2020).
+    """`vehicle` without wheel slip below the speed `below` (m/s, 0.1 by default): CommonRoad's ST model (Althoff & Würsching,
+    CommonRoad: Vehicle Models, 2020).
 
-    Below it, with beta_0 = atan(b tan(delta) / L) and v the speed of the centre of gravity along its path, the car moves with
-    the sideslip beta_0 and the yaw rate `v cos(beta_0) tan(delta) / L`, and the states follow the steer:
+    Below this speed, with beta_0 = atan(b tan(delta) / L) and v the speed of the centre of gravity along its path, the car moves
+    with the sideslip beta_0 and the yaw rate `v cos(beta_0) tan(delta) / L`, and the states follow the steer:
 
         dbeta/dt = b ddelta/dt / (L cos^2(delta) (1 + (b tan(delta) / L)^2))
         dr/dt    = (dv/dt cos(beta) tan(delta) - v sin(beta) dbeta/dt tan(delta) + v cos(beta) ddelta/dt / cos^2(delta)) / L
 
-    At the speed itself the motion jumps from what the wheels roll to what the states say. Where smoothness matters take the
-    vehicle's own `crawl_speed` instead; from `below` upwards that should have ended for CommonRoad's numbers.
+    At this speed the motion jumps between the kinematic one and that of the states. If a smooth model is needed, use the
+    vehicle's own `crawl_speed` instead. To reproduce CommonRoad's numbers the vehicle's `crawl_speed` must not exceed `below`.
 
     **Erratum**: commonroad-vehicle-models 3.0.2 has tan^2(delta) for tan(delta) inside the last square of dbeta/dt.
 
     **Inputs**: those of the vehicle, `steer_rate` (rad/s) and `v_x_rate` (m/s^2).
 
-    **Raises** `InputError` for another vehicle than `LinearSingleTrack`, one whose rear wheels are steered, or a speed that is
+    **Raises** `InputError` for a vehicle other than `LinearSingleTrack`, a vehicle with steered rear wheels, or a speed that is
     not positive.
     """
 
@@ -41,8 +41,8 @@ class KinematicCrawl(AbstractVehicle):
             raise InputError(f"KinematicCrawl.vehicle = {type(self.vehicle).__name__}: must be a LinearSingleTrack.")
         if not self.vehicle.steering.front_alone:
             raise InputError(
-                f"KinematicCrawl.vehicle.steering = {type(self.vehicle.steering).__name__}: must steer the front wheels alone. "
-                "Take the vehicle as it is, whose own crawl_speed serves any steering."
+                f"KinematicCrawl.vehicle.steering = {type(self.vehicle.steering).__name__}: must steer only the front wheels. "
+                "Use the vehicle without KinematicCrawl: its own crawl_speed works with any steering."
             )
         check_positive("KinematicCrawl.below", self.below, "m/s")
 

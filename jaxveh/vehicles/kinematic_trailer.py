@@ -1,4 +1,4 @@
-"""A kinematic single track that pulls a trailer."""
+"""A kinematic single-track model with a trailer."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from jaxveh.vehicles.wheels import gravity, is_straight
 
 
 class KinematicTrailerState(NamedTuple):
-    """`yaw` of the car and `hitch_angle` (rad): the trailer's yaw less the car's, unwrapped."""
+    """The `yaw` of the car and the `hitch_angle` (rad): the trailer's yaw less the car's, unwrapped."""
 
     yaw: Any
     hitch_angle: Any
 
 
 class KinematicTrailerOutputs(NamedTuple):
-    """What can be said without forces, at the car's rear axle: speeds m/s, angles rad, rates rad/s, accelerations m/s^2 (of an
-    ideal accelerometer in a turn of constant speed and steer); `trailer_yaw`, and `trailer_v_x` (m/s), the speed of the
+    """The kinematic outputs at the car's rear axle: speeds m/s, angles rad, rates rad/s, accelerations m/s^2 (signals of an
+    ideal accelerometer in a turn of constant speed and steer); `trailer_yaw` (rad), and `trailer_v_x` (m/s), the speed of the
     trailer's axle along the trailer; `speed` and `course` over ground."""
 
     v_x: Any
@@ -57,20 +57,20 @@ UNITS = {
 
 
 class KinematicTrailer(AbstractKinematic):
-    """A kinematic single track with a trailer of one axle; no wheel slips. Position and speeds are those of the rear axle.
+    """A kinematic single track with a one-axle trailer, without wheel slip. Position and speeds are those of the rear axle.
 
-    With delta the steer, r the yaw rate, alpha the hitch angle, c the hitch's distance behind the rear axle and l the trailer's
-    length from the hitch to its axle (S. M. LaValle, Planning Algorithms, 2006, sec. 13.1.2, and CommonRoad's KST model for c =
-    0):
+    With delta the steer, r the yaw rate, alpha the hitch angle, c the distance of the hitch behind the rear axle and l the
+    distance from the hitch to the trailer's axle (S. M. LaValle, Planning Algorithms, 2006, sec. 13.1.2, and CommonRoad's KST
+    model for c = 0):
 
         dyaw/dt   = v_x tan(delta) / L
         dalpha/dt = -(v_x sin(alpha) + c r cos(alpha)) / l - r
 
-    A rear axle that is steered by delta_r moves to the left with v_y = v_x tan(delta_r): the yaw rate is that of `Kinematic`,
-    and c r - v_y stands in the place of c r. At `hitch_limit` (rad either way, a right angle by default) the trailer touches
-    the car: the angle does not grow.
+    A rear axle steered by delta_r moves to the left with v_y = v_x tan(delta_r): the yaw rate is that of `Kinematic`, and
+    c r - v_y replaces c r. At `hitch_limit` (rad to both sides, a right angle by default) the trailer touches the car, and the
+    angle does not grow further.
 
-    **Parameters**: `wheelbase` L, `trailer_length` l, `hitch_behind_axle` c (m; 0: the hitch sits on the rear axle).
+    **Parameters**: `wheelbase` L (m), `trailer_length` l (m), `hitch_behind_axle` c (m; 0: the hitch is on the rear axle).
 
     **Inputs**: those of `steering` (`steer`, rad at the road wheels) and `v_x` (m/s).
 
@@ -94,7 +94,7 @@ class KinematicTrailer(AbstractKinematic):
 
     @property
     def wheel_positions(self):
-        """Those of the car; the trailer's own are not among them."""
+        """The positions of the car's wheels; those of the trailer are not included."""
         front, rear = (self.wheelbase, 0.0), (0.0, 0.0)
         return front, front, rear, rear
 
@@ -113,7 +113,7 @@ class KinematicTrailer(AbstractKinematic):
         moves = self.motion(x, u)
         yaw_rate = moves.yaw_rate
         sine, cosine = numerics.sin(x.hitch_angle), numerics.cos(x.hitch_angle)
-        # The hitch moves with (v_x, v_y - c r) in the car's directions; across the trailer that is l times the trailer's yaw
+        # The hitch moves with (v_x, v_y - c r) in the car's axes. The component across the trailer is l times the trailer's yaw
         # rate.
         aside = self.rear_aside(u)
         swing = self.hitch_behind_axle * yaw_rate

@@ -1,4 +1,4 @@
-"""What those who add a vehicle build with."""
+"""The building blocks for new vehicles."""
 
 from jaxveh.vehicles.base import with_batch_shape
 from jaxveh.vehicles.drive import AbstractDriven

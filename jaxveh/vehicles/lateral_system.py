@@ -1,4 +1,4 @@
-"""The linear lateral dynamics of a car at one speed, and what follows from them in closed form."""
+"""The linear lateral dynamics of a car at one speed, with closed-form characteristics."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from jaxveh import numerics
 
 
 class LateralResponse(NamedTuple):
-    """Complex amplitudes over that of the steer: of the `sideslip` (-), the `yaw_rate` (1/s) and `a_y` (m/s^2 a rad)."""
+    """The complex amplitudes of `sideslip` (-), `yaw_rate` (1/s) and `a_y` (m/s^2 per rad) over that of the steer."""
 
     sideslip: Any
     yaw_rate: Any
@@ -22,8 +22,8 @@ class LateralSystem(NamedTuple):
     """d/dt (sideslip, yaw_rate) = A (sideslip, yaw_rate) + B steer, at the speed `speed` (m/s).
 
     `a_11` (1/s), `a_12` (-), `a_21` (1/s^2), `a_22` (1/s) are the entries of A, `b_1` (1/s) and `b_2` (1/s^2) those of B;
-    scalars, or arrays of one shape. All that follows is of second order (M. Mitschke & H. Wallentowitz, Dynamik der
-    Kraftfahrzeuge, the chapter on the linear single-track model).
+    scalars, or arrays of one shape. The characteristics are those of a second-order system (M. Mitschke & H. Wallentowitz,
+    Dynamik der Kraftfahrzeuge, the chapter on the linear single-track model).
     """
 
     a_11: Any
@@ -36,17 +36,18 @@ class LateralSystem(NamedTuple):
 
     @property
     def trace(self) -> Any:
-        """Sum of the eigenvalues, 1/s."""
+        """The sum of the eigenvalues, 1/s."""
         return self.a_11 + self.a_22
 
     @property
     def determinant(self) -> Any:
-        """Product of the eigenvalues, 1/s^2; negative beyond the critical speed."""
+        """The product of the eigenvalues, 1/s^2; negative above the critical speed."""
         return self.a_11 * self.a_22 - self.a_12 * self.a_21
 
     @property
     def eigenvalues(self) -> tuple[Any, Any]:
-        """tr / 2 +- sqrt(tr^2 / 4 - det), 1/s, both complex; the more stable real one, or the conjugate, comes second."""
+        """The eigenvalues tr / 2 +- sqrt(tr^2 / 4 - det), 1/s, as complex numbers; the second one is the more stable real one or
+        the one with negative imaginary part."""
         half = 0.5 * self.trace
         inside = half * half - self.determinant
         real = numerics.sqrt(jnp.maximum(inside, 0.0))
@@ -55,12 +56,12 @@ class LateralSystem(NamedTuple):
 
     @property
     def natural_frequency(self) -> Any:
-        """Undamped natural frequency sqrt(det), rad/s; nan where the car is unstable (det <= 0)."""
+        """The undamped natural frequency sqrt(det), rad/s; nan if the car is unstable (det <= 0)."""
         return jnp.where(self.determinant > 0, numerics.sqrt(jnp.maximum(self.determinant, 0.0)), jnp.nan)
 
     @property
     def damping_ratio(self) -> Any:
-        """-tr / (2 sqrt(det)), 1 and above where nothing swings; nan where the car is unstable (det <= 0)."""
+        """The damping ratio -tr / (2 sqrt(det)), 1 or more without oscillation; nan if the car is unstable (det <= 0)."""
         held = self.determinant > 0
         return jnp.where(held, -0.5 * self.trace / numerics.sqrt(jnp.where(held, self.determinant, 1.0)), jnp.nan)
 

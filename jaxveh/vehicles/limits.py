@@ -1,4 +1,4 @@
-"""What a driver and a drive cannot do: limits of steering and of acceleration."""
+"""Limits of steering and of acceleration."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from jaxveh._core.parameter import check_parameters, parameter, positive
 
 
 class SteerLimits(eqx.Module):
-    """Steering that stops at `smallest` and `largest` (rad at the road wheels) and turns no faster than `slowest` (negative) to
+    """Limits of the steer, `smallest` and `largest` (rad at the road wheels), and of its rate, `slowest` (rad/s, negative) and
     `fastest` (rad/s): the steering constraints of CommonRoad (Althoff & Würsching, CommonRoad: Vehicle Models, 2020).
 
-    **Raises** `InputError` where a limit is not finite or lies on the wrong side of zero.
+    **Raises** `InputError` for a limit that is not finite or that has the wrong sign.
     """
 
     smallest: jax.Array = parameter("rad", scale=1.0)
@@ -30,17 +30,17 @@ class SteerLimits(eqx.Module):
             check(f"SteerLimits.{name}", getattr(self, name), lambda v: v < 0, "negative")
 
     def limit(self, steer: Any, rate: Any) -> Any:
-        """The steering rate (rad/s) that becomes of the wished `rate` at the angle `steer` (rad)."""
+        """The limited steering rate (rad/s) for a commanded `rate` at the angle `steer` (rad)."""
         stopped = ((steer <= self.smallest) & (rate <= 0)) | ((steer >= self.largest) & (rate >= 0))
         return jnp.where(stopped, 0.0, jnp.clip(rate, self.slowest, self.fastest))
 
 
 class AccelerationLimits(eqx.Module):
-    """Tyres and engine: `largest` (m/s^2) either way, forwards above `switching_speed` (m/s) only `largest v_s / v`, the engine's
-    power; no further than the speeds `backwards` (negative) and `forwards` (m/s): the acceleration constraints of CommonRoad
-    (Althoff & Würsching, CommonRoad: Vehicle Models, 2020).
+    """Limits of the acceleration by tyres and engine: `largest` (m/s^2) in both directions; above `switching_speed` v_s (m/s) the
+    engine's power limits the forward acceleration to `largest v_s / v`. The speed stays between `backwards` (m/s, negative) and
+    `forwards` (m/s). The acceleration constraints of CommonRoad (Althoff & Würsching, CommonRoad: Vehicle Models, 2020).
 
-    **Raises** `InputError` where a limit is not finite or lies on the wrong side of zero.
+    **Raises** `InputError` for a limit that is not finite or that has the wrong sign.
     """
 
     largest: jax.Array = positive("m/s^2")
@@ -53,7 +53,7 @@ class AccelerationLimits(eqx.Module):
         check("AccelerationLimits.backwards", self.backwards, lambda v: v < 0, "negative (m/s)")
 
     def limit(self, speed: Any, acceleration: Any) -> Any:
-        """The acceleration (m/s^2) that becomes of the wished one at a speed (m/s)."""
+        """The limited acceleration (m/s^2) for a commanded `acceleration` at a `speed` (m/s)."""
         stopped = ((speed <= self.backwards) & (acceleration <= 0)) | ((speed >= self.forwards) & (acceleration >= 0))
         power = self.largest * self.switching_speed / jnp.maximum(speed, self.switching_speed)
         return jnp.where(stopped, 0.0, jnp.clip(acceleration, -self.largest, power))

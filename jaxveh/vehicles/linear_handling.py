@@ -1,4 +1,4 @@
-"""The textbook's linear single track, and its handling in closed form."""
+"""The textbook linear single-track model and its handling in closed form."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class LinearSingleTrackState(NamedTuple):
 
 
 class LinearSingleTrack(AbstractOneTrack):
-    """The single track for small angles: linear in steer, sideslip and yaw rate at a given speed v.
+    """The single-track model for small angles, linear in steer, sideslip and yaw rate at a given speed v.
 
     With C_f, C_r the axles' cornering stiffnesses, a and b their distances from the centre of gravity (P. Riekert & T. E.
     Schunck 1940; R. Rajamani, Vehicle Dynamics and Control, 2nd ed., sec. 2.3):
@@ -38,16 +38,16 @@ class LinearSingleTrack(AbstractOneTrack):
         m v (dbeta/dt + r) = F_f + F_r,      J_z dr/dt = a F_f - b F_r
         F_f = C_f (delta - beta - a r / v),  F_r = C_r (-beta + b r / v)
 
-    A rear axle that is steered by delta_r has the force `C_r (delta_r - beta + b r / v)`; gains and responses are those to
-    `steer`, with the rear angle that `steering` makes of it. For small angles the speed along the car is that along the path:
-    `v_x` is taken as the latter, so that the velocity has the components `v cos(beta)` and `v sin(beta)`. Backwards (v < 0) the
-    slip angles reverse sign, as the tyres' forces do. Below `crawl_speed` (m/s, 3 by default) |v| in the denominators is
-    `regularised_speed`, so that standstill is an ordinary point. A road's bank pushes by `m g_y`; its friction does not count,
-    as always in a linear law.
+    A rear axle steered by delta_r has the force `C_r (delta_r - beta + b r / v)`. Gains and responses are those to `steer`, with
+    the rear angle that `steering` gives for it. For small angles the speed along the car and that along the path are equal. Here
+    `v_x` is the speed along the path, so that the velocity has the components `v cos(beta)` and `v sin(beta)`. In backward
+    travel (v < 0) the slip angles reverse sign, as the tyre forces do. Below `crawl_speed` (m/s, 3 by default) |v| in the
+    denominators is `regularised_speed`, so that standstill is a regular point. A bank of the road adds the force `m g_y`; the
+    road's friction has no effect, as in any linear law.
 
-    **Parameters**: `front_stiffness`, `rear_stiffness` (N/rad, of the axle at rest on a level road), `cg_height` (m; None:
-    stiffnesses stay). With a height the stiffnesses are proportional to the axles' loads, which move by `m a_x h / (a + b)` to
-    the rear, as in CommonRoad's ST model.
+    **Parameters**: `front_stiffness`, `rear_stiffness` (N/rad, of the axle at rest on a level road), `cg_height` (m; None: the
+    stiffnesses are constant). With a height the stiffnesses are proportional to the axle loads, of which `m a_x h / (a + b)`
+    moves to the rear, as in CommonRoad's ST model.
 
     **Inputs**: those of `steering` (`steer`, rad at the road wheels), `v_x` (m/s) and, with a `cg_height`, `v_x_rate = dv_x/dt`
     (m/s^2).
@@ -118,7 +118,7 @@ class LinearSingleTrack(AbstractOneTrack):
         return rates, with_batch_shape(outputs)
 
     def load_shares(self, u, ground: Ground = LEVEL) -> tuple[Any, Any]:
-        """Loads of front and rear axle over those at rest on a level road (-); they multiply the stiffnesses."""
+        """The loads of front and rear axle over those at rest on a level road (-); they multiply the stiffnesses."""
         if self.cg_height is None:
             return 1.0, 1.0
         if not hasattr(u, "v_x_rate"):
@@ -129,8 +129,8 @@ class LinearSingleTrack(AbstractOneTrack):
         return pressed - moved / self.rear_axle_to_cg, pressed + moved / self.front_axle_to_cg
 
     def system(self, speed: Any) -> LateralSystem:
-        """The matrices at a constant forward `speed` (m/s, any shape, above the crawl speed to agree with `evaluate`), on a level
-        road. **Raises** `InputError` for a speed that is not positive, or a `steering` without the input `steer`."""
+        """The system matrices at a constant forward `speed` (m/s, any shape) on a level road. They agree with `evaluate` above
+        the crawl speed. **Raises** `InputError` for a speed that is not positive, or a `steering` without the input `steer`."""
         check_positive("LinearSingleTrack.system: speed", speed, "m/s")
         v = speed
         m, J, a, b = self.mass, self.yaw_inertia, self.front_axle_to_cg, self.rear_axle_to_cg
@@ -151,44 +151,44 @@ class LinearSingleTrack(AbstractOneTrack):
     @property
     def understeer_gradient(self) -> jax.Array:
         """K = m / L (b / C_f - a / C_r), rad s^2/m: in a steady turn of radius R the steer is `L / R + K a_y` (T. D. Gillespie,
-        Fundamentals of Vehicle Dynamics, ch. 6, and so the following)."""
+        Fundamentals of Vehicle Dynamics, ch. 6, also the source of the speeds and gains below)."""
         bending = self.rear_axle_to_cg / self.front_stiffness - self.front_axle_to_cg / self.rear_stiffness
         return self.mass / self.wheelbase * bending
 
     @property
     def understeer_gradient_deg_per_g(self) -> jax.Array:
-        """The same in the usual unit: degrees at the road wheels a g of lateral acceleration."""
+        """The understeer gradient in the usual unit: degrees at the road wheels per g of lateral acceleration."""
         return jnp.rad2deg(self.understeer_gradient) * GRAVITY
 
     @property
     def characteristic_speed(self) -> jax.Array:
-        """sqrt(L / K), m/s: there the yaw-rate gain of an understeering car is greatest; infinite for another car."""
+        """sqrt(L / K), m/s, at which the yaw-rate gain of an understeering car is greatest; infinite for other cars."""
         return _speed(self.wheelbase, self.understeer_gradient)
 
     @property
     def critical_speed(self) -> jax.Array:
-        """sqrt(-L / K), m/s: beyond it an oversteering car is unstable; infinite for another car."""
+        """sqrt(-L / K), m/s, above which an oversteering car is unstable; infinite for other cars."""
         return _speed(self.wheelbase, -self.understeer_gradient)
 
     def yaw_rate_gain(self, speed: Any) -> Any:
-        """Steady yaw rate over steer, (1 - k) v / (L + K v^2), 1/s, with the ratio k of rear to front angle."""
+        """The steady yaw rate over steer, (1 - k) v / (L + K v^2), 1/s, with the ratio k of rear to front angle."""
         return self._turning(speed) * speed / self._steadiness(speed)
 
     def lateral_acceleration_gain(self, speed: Any) -> Any:
-        """Steady lateral acceleration over steer, (1 - k) v^2 / (L + K v^2), m/s^2 a rad."""
+        """The steady lateral acceleration over steer, (1 - k) v^2 / (L + K v^2), m/s^2 per rad."""
         return self._turning(speed) * speed * speed / self._steadiness(speed)
 
     def sideslip_gain(self, speed: Any) -> Any:
-        """Steady sideslip over steer, k + (1 - k) (b - a m v^2 / (L C_r)) / (L + K v^2) (-): with a rear axle that is not steered
-        positive at low speed, where the rear runs on a smaller circle, negative at high speed (Mitschke & Wallentowitz, the
-        same chapter)."""
+        """The steady sideslip over steer, k + (1 - k) (b - a m v^2 / (L C_r)) / (L + K v^2) (-). If the rear axle is not steered,
+        it is positive at low speed, where the rear runs on a smaller circle, and negative at high speed (M. Mitschke & H.
+        Wallentowitz, Dynamik der Kraftfahrzeuge, the chapter on the linear single-track model)."""
         pushed = self.front_axle_to_cg * self.mass * speed * speed / (self.wheelbase * self.rear_stiffness)
         trailing = (self.rear_axle_to_cg - pushed) / self._steadiness(speed)
         _, behind = self.steering.axle_gains(speed)
         return trailing if is_straight(behind) else behind + (1.0 - behind) * trailing
 
     def _turning(self, speed):
-        """The part of the steer that turns the car (-): what the axles do not turn alike."""
+        """The part of the steer that turns the car (-): the difference of the angles of front and rear axle over the steer."""
         return 1.0 - self.steering.axle_gains(speed)[1]
 
     def _steadiness(self, speed):
@@ -196,6 +196,6 @@ class LinearSingleTrack(AbstractOneTrack):
 
 
 def _speed(wheelbase, gradient):
-    """sqrt(L / K) where K is positive, else infinite."""
+    """sqrt(L / K) if K is positive, otherwise infinite."""
     held = gradient > 0
     return jnp.where(held, numerics.sqrt(wheelbase / jnp.where(held, gradient, 1.0)), jnp.inf)

@@ -1,4 +1,4 @@
-"""Any car as the linear single track with the same slopes."""
+"""The linear single-track model of any car, with the same tyre slopes at zero slip."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from jaxveh.vehicles.linear_handling import LinearSingleTrack
 from jaxveh.vehicles.steering import FrontSteering
 
 SPEED = 20.0
-"""m/s: what tyres that ask for a speed are told."""
+"""m/s: the speed for tyres that need one."""
 
 
 def linear_single_track(car: Any, *, cg_height: Any = None) -> LinearSingleTrack:
-    """The linear single track with the mass, inertia and geometry of `car` and the slopes of its tyres at rest.
+    """The linear single track with the mass, inertia and geometry of `car` and the slopes of its tyres under static loads.
 
-    `car` is a single track, whose tyres are the axles', or a car with tracks, whose tyres are the wheels': an axle's stiffness
-    is then twice that of a wheel that carries half its load. Its `steering` is the car's. The slope is that of the lateral
-    force over slip angle at zero slip (of the settled force, for a tyre with states). `cg_height` (m) makes stiffness
-    proportional to load; see `LinearSingleTrack`.
+    `car` is a single track, whose tyres are those of the axles, or a car with tracks, whose tyres are those of the wheels. In
+    the second case the stiffness of an axle is twice that of a wheel with half its load. The `steering` is that of the car. The
+    slope is that of the lateral force over slip angle at zero slip (of the steady force for a tyre with states). With a
+    `cg_height` (m) the stiffness is proportional to load, see `LinearSingleTrack`.
 
     **Raises** `InputError` for a car without mass, yaw inertia, axle distances or tyres.
     """
@@ -47,8 +47,8 @@ def linear_single_track(car: Any, *, cg_height: Any = None) -> LinearSingleTrack
 
 
 def settled_stiffness(tyre: AbstractTyre, load: Any) -> jax.Array:
-    """Slope of the lateral force over slip angle at zero slip, N/rad, under a `load` (N); of the settled force where the tyre has
-    states."""
+    """The slope of the lateral force over slip angle at zero slip, N/rad, under a `load` (N); for a tyre with states that of its
+    steady force."""
     load = jnp.asarray(load)
 
     def force(slip_angle):

@@ -1,4 +1,4 @@
-"""How the loads of a car without suspension follow its accelerations."""
+"""Load transfer: the wheel loads of a car without suspension as a function of its accelerations."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from jaxveh.vehicles.wheels import Wheels
 
 
 class AbstractLoadTransfer(eqx.Module):
-    """Which accelerations shift the loads. `felt_accelerations` are those at an instant; states, where there are any, are the
-    car's, and zero where it runs straight.
+    """The accelerations that determine the load transfer. `felt_accelerations` gives them at an instant. States, if there are
+    any, are part of the car's state and zero in straight running.
 
-    Longitudinally it is what the tyres push, over the mass: the air's drag acts at the centre of gravity's height, so that in
-    moments about it only forces of the road count.
+    The longitudinal acceleration is the tyre force over the mass: air drag acts at the height of the centre of gravity and has
+    no moment about it.
     """
 
     state_names: eqx.AbstractVar[tuple[str, ...]]
@@ -29,15 +29,15 @@ class AbstractLoadTransfer(eqx.Module):
 
     @abc.abstractmethod
     def felt_accelerations(self, x: Any, u: Any, guess: tuple[Any, Any]) -> tuple[Any, Any]:
-        """(a_x, a_y), m/s^2, that the loads feel; `guess` are those of the car in a steady turn under its torques."""
+        """The accelerations (a_x, a_y), m/s^2, that determine the loads; `guess` are those in a steady turn under the torques."""
 
     @abc.abstractmethod
     def rates(self, x: Any, a_x: Any, a_y: Any) -> tuple:
-        """The time derivatives of the states where the tyres push with a_x, a_y (m/s^2: force over mass)."""
+        """The time derivatives of the states for the tyres' force over mass `a_x`, `a_y` (m/s^2)."""
 
 
 class AbstractImmediate(AbstractLoadTransfer):
-    """Loads that follow at once, and so need no state."""
+    """Loads without lag, for which no state is needed."""
 
     state_names: ClassVar[tuple[str, ...]] = ()
 
@@ -46,7 +46,7 @@ class AbstractImmediate(AbstractLoadTransfer):
 
 
 class StaticLoads(AbstractImmediate):
-    """Loads as at rest."""
+    """Constant loads, as at rest."""
 
     inputs: ClassVar[tuple[str, ...]] = ()
 
@@ -55,11 +55,11 @@ class StaticLoads(AbstractImmediate):
 
 
 class QuasiStatic(AbstractImmediate):
-    """Loads follow at once the accelerations of a steady turn, `a_y = v_x yaw_rate`, and of the torques, `a_x = T / (m r)`.
+    """Loads without lag, from the accelerations of a steady turn, `a_y = v_x yaw_rate`, and of the torques, `a_x = T / (m r)`.
 
-    They need no tyre force, so that there is no loop to solve. A car that yaws without turning (on two frictions, in a spin) has
-    no such acceleration, and there the loads are wrong. Cars without wheel spins bound a_x by the road's grip; `SevenDOF`
-    does not, and its braking torques must be those that the road holds.
+    No tyre force is needed, so that there is no algebraic loop. If a car yaws without turning (on split friction, in a spin) it
+    does not have this acceleration, and the loads are wrong. Cars without wheel spin limit a_x by the road's grip. `SevenDOF`
+    does not; its braking torques must not exceed what the road can transmit.
     """
 
     inputs: ClassVar[tuple[str, ...]] = ()
@@ -69,9 +69,9 @@ class QuasiStatic(AbstractImmediate):
 
 
 class LaggedLoads(AbstractLoadTransfer):
-    """Loads follow the accelerations that the tyres make with a first-order lag of `time` (s), that of its roll and pitch.
+    """Loads that follow the accelerations due to the tyres with a first-order lag of `time` (s), that of roll and pitch.
 
-    The states `a_x_felt`, `a_y_felt` (m/s^2) break the loop from forces over accelerations and loads back to forces; in a
+    The states `a_x_felt`, `a_y_felt` (m/s^2) break the loop from forces through accelerations and loads back to forces. In a
     steady state the loads are those of the accelerations.
     """
 
@@ -90,9 +90,9 @@ class LaggedLoads(AbstractLoadTransfer):
 
 
 class MeasuredLoads(AbstractImmediate):
-    """Loads of accelerations that are measured: `a_x` and `a_y` (m/s^2) become inputs, as in filters on real logs.
+    """Loads from measured accelerations: `a_x` and `a_y` (m/s^2) become inputs, as in filters on real logs.
 
-    An accelerometer feels the air's drag, too; it is left in (at 45 m/s some 2 % of an axle's load).
+    An accelerometer also measures the deceleration by air drag, which is not corrected (at 45 m/s some 2 % of an axle's load).
     """
 
     inputs: ClassVar[tuple[str, ...]] = ("a_x", "a_y")
@@ -102,9 +102,9 @@ class MeasuredLoads(AbstractImmediate):
 
 
 class AbstractShiftingLoads(AbstractPlaneBody):
-    """A car whose wheel loads follow from accelerations.
+    """A car whose wheel loads depend on accelerations.
 
-    **Parameters** of the loads: `load_transfer`, by which they follow accelerations (`QuasiStatic`, `LaggedLoads`, ...).
+    **Parameters** of the loads: `load_transfer`, how they depend on accelerations (`QuasiStatic`, `LaggedLoads`, ...).
     """
 
     _: KW_ONLY
@@ -112,7 +112,7 @@ class AbstractShiftingLoads(AbstractPlaneBody):
 
 
 class AxleWeights(Protocol):
-    """What the loads of axles depend on: mass (kg), places of the axles and height of the centre of gravity (m)."""
+    """The parameters of axle loads: mass (kg), positions of the axles and height of the centre of gravity (m)."""
 
     @property
     def mass(self) -> Any: ...
@@ -125,8 +125,8 @@ class AxleWeights(Protocol):
 
 
 class WheelWeights(AxleWeights, Protocol):
-    """What the loads of an upright car's wheels depend on: besides, tracks (m) and the front axle's share of the lateral transfer
-    (-; None: by the static loads)."""
+    """The parameters of the wheel loads of a car without roll: also the tracks (m) and the front axle's share of the lateral
+    transfer (-; None: as the static loads are shared)."""
 
     @property
     def track_front(self) -> Any: ...
@@ -138,17 +138,17 @@ class WheelWeights(AxleWeights, Protocol):
 
 @numerics.fence_results
 def planar_loads(car: WheelWeights, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
-    """Wheel loads, N, of a rigid car whose body neither rolls nor pitches visibly.
+    """The wheel loads, N, of a rigid car whose roll and pitch angles are negligible.
 
-    In the road's plane, with a_x, a_y what accelerometers at the centre of gravity say (slopes are in them), g_z gravity along
-    z (upwards, so -9.81 on a level road), h the height of the centre of gravity and q the front axle's share of the lateral
-    transfer:
+    In the road's plane, with a_x, a_y the signals of accelerometers at the centre of gravity (which include slopes), g_z gravity
+    along z (upwards, so -9.81 on a level road), h the height of the centre of gravity and q the front axle's share of the
+    lateral transfer:
 
         front axle:  m (-g_z b - a_x h) / (a + b),  moved to its right wheel:  q m a_y h / track_front
         rear axle:   m (-g_z a + a_x h) / (a + b),  moved to its right wheel:  (1 - q) m a_y h / track_rear
 
-    No wheel is pulled down: one that lifts leaves the axle's load to the other, and an axle that lifts to the other axle. What
-    an axle on one wheel cannot take of the moment the other axle takes.
+    Loads are never negative. If a wheel lifts, the other wheel carries the load of the axle; if an axle lifts, the other axle
+    carries the car. The part of the moment that an axle on one wheel cannot take is taken by the other axle.
     """
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     share = b / (a + b) if car.front_roll_share is None else car.front_roll_share
@@ -156,8 +156,9 @@ def planar_loads(car: WheelWeights, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     track_front, track_rear = car.track_front, car.track_rear
     front, rear = axle_loads(car, a_x, g_z)
     half_front, half_rear = 0.5 * front, 0.5 * rear
-    # The rear takes what the front leaves of the moment, then the front what the rear leaves. Each is read by both wheels of
-    # an axle and by the other axle: computed once it is 180 instead of 192 ns a step of 7-DOF cars (float32, 1000 runs).
+    # The rear takes the part of the moment that the front leaves, then the front the part that the rear leaves. Both wheels of
+    # an axle and the other axle use each result: computed once, a step of 7-DOF cars takes 180 instead of 192 ns (float32, 1000
+    # runs).
     first_front = limit_transfer(share / track_front * moment, half_front)
     moved_rear = limit_transfer(moment * (1.0 / track_rear) - first_front * (track_front / track_rear), half_rear)
     moved_rear = numerics.fence(moved_rear)
@@ -167,12 +168,12 @@ def planar_loads(car: WheelWeights, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
 
 
 def limit_transfer(moved: Any, half: Any) -> Any:
-    """What moves from the left to the right wheel, N, no more than `half` of the axle's load."""
+    """The load that moves from the left to the right wheel, N, limited to `half` the axle's load."""
     return jnp.clip(moved, -half, half)
 
 
 def axle_loads(car: AxleWeights, a_x: Any, g_z: Any) -> tuple[Any, Any]:
-    """Loads of the front and the rear axle, N: `m (-g_z b - a_x h) / (a + b)` and the rest of the weight, none below zero."""
+    """The loads of front and rear axle, N: `m (-g_z b - a_x h) / (a + b)` and the rest of the weight, neither below zero."""
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     weight = -car.mass * g_z
     moved = car.mass * car.cg_height / (a + b) * a_x

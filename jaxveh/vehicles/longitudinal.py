@@ -1,4 +1,4 @@
-"""Speed alone: a car on a grade, pulled and braked by torques."""
+"""Longitudinal motion only: a car on a grade, driven and braked by torques."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from jaxveh.vehicles.wheels import gravity, travel_direction
 
 
 class LongitudinalState(NamedTuple):
-    """Speed `v_x` (m/s)."""
+    """The speed `v_x` (m/s)."""
 
     v_x: Any
 
 
 class LongitudinalOutputs(NamedTuple):
-    """Speed m/s; `v_x_rate` dv/dt and `a_x`, what an ideal accelerometer says, m/s^2; the road's `grade` (rad); forces along
-    the car (N): of the drive, the brakes, rolling resistance, the air and the grade, positive forwards; `drive_power` (W)."""
+    """Speed `v_x` (m/s); `v_x_rate` dv/dt and `a_x`, the signal of an ideal accelerometer (m/s^2); the road's `grade` (rad); the
+    forces along the car (N, positive forwards) of drive, brakes, rolling resistance, air and grade; `drive_power` (W)."""
 
     v_x: Any
     v_x_rate: Any
@@ -47,20 +47,20 @@ UNITS = {
 
 
 class Longitudinal(AbstractVehicle):
-    """A car that goes straight, without slip: the plant of speed control, and of the estimation of mass and grade.
+    """A car in straight travel without slip: the plant of speed control, and the model for estimating mass and grade.
 
     With r the wheel's radius, J_w the inertia of each of four wheels, theta the grade and s the smooth sign of the speed
     (R. Rajamani, Vehicle Dynamics and Control, 2nd ed., sec. 4.1; the wheels turn with the speed):
 
         (m + 4 J_w / r^2) dv/dt = (T_drive - s T_brake) / r - s f_r m g cos(theta) - drag v |v| - m g sin(theta)
 
-    Brakes and rolling resistance change sign smoothly about 0.5 m/s, so that standstill is an ordinary point; a braked car on
-    a slope creeps where they hold the slope's pull.
+    Brakes and rolling resistance change sign smoothly below 0.94 m/s (`wheels.STANDSTILL`), so that standstill is a regular
+    point. A car that is held by its brakes on a slope therefore creeps.
 
     **Parameters**: `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2, of one wheel), `drag` (N s^2/m^2, half the air's
     density times c_d times the area), `rolling_resistance` f_r (-).
 
-    **Inputs**: `drive_torque` and `brake_torque` (N m), sums over the wheels; the second at least zero.
+    **Inputs**: `drive_torque` and `brake_torque` (N m), sums over the wheels; the brake torque is at least zero.
 
     **Raises** `InputError` for parameters outside their domain.
     """
@@ -88,7 +88,7 @@ class Longitudinal(AbstractVehicle):
 
     @property
     def moving_mass(self) -> jax.Array:
-        """The mass that a force along the car accelerates, kg: the car's and that of its turning wheels."""
+        """The effective mass for a force along the car, kg: the car's mass and the inertia of its turning wheels."""
         return self.mass + 4.0 * self.wheel_inertia / self.wheel_radius**2
 
     def start(self, t, u, **values):

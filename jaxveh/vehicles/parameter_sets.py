@@ -1,4 +1,4 @@
-"""Named parameter sets, and cars from a specification: functions, so that nothing is made on import."""
+"""Named parameter sets, and cars from a specification. They are functions, so that importing creates no arrays."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def passenger_car() -> SingleTrack:
 
     1420 kg, 2124 kg m^2, wheelbase 2.55 m, Magic Formula axles (B C D is 88 kN/rad in front and 127 kN/rad behind).
 
-    **Erratum**: the paper prints the distances the other way round (`passenger_car_as_printed`). Its front axle would
-    then need a friction coefficient of 1.5, and the car would spin at 2 degrees of a double lane change at 25 m/s;
-    swapped, as here, it is an ordinary understeering car. Its cornering stiffnesses are in kN/rad, and are not the
-    printed 117 and 144.
+    **Erratum**: the paper prints the two distances in exchanged order (`passenger_car_as_printed`). The front axle would then
+    need a friction coefficient of 1.5, and the car would spin in a double lane change at 25 m/s with 2 degrees of steer.
+    Swapped, as here, it is an ordinary understeering car. Its cornering stiffnesses are in kN/rad, and are not the printed 117
+    and 144.
     """
     return _printed_car(front_axle_to_cg=0.96, rear_axle_to_cg=1.59)
 
@@ -29,7 +29,7 @@ def passenger_car() -> SingleTrack:
 def passenger_car_as_printed() -> SingleTrack:
     """The passenger car of Bao, Sabbioni et al. (2015) with the distances as printed: front 1.59 m, rear 0.96 m.
 
-    For reproducing the paper only: it oversteers and spins easily; see `passenger_car` for the erratum.
+    Only for reproducing the paper: the car oversteers and spins easily; see `passenger_car` for the erratum.
     """
     return _printed_car(front_axle_to_cg=1.59, rear_axle_to_cg=0.96)
 
@@ -46,18 +46,18 @@ def _printed_car(front_axle_to_cg: float, rear_axle_to_cg: float) -> SingleTrack
 
 
 def axle_from_stiffness(stiffness, load) -> MagicFormula:
-    """A Magic Formula axle of a given cornering stiffness (N/rad) at a static load (N), else generic.
+    """A generic Magic Formula axle with a given cornering stiffness (N/rad) at a static load (N).
 
-    Peak force D is the load (friction coefficient 1), C 1.3 and E -0.5 are those of an ordinary tyre, and
+    The peak force D is the load (friction coefficient 1), C = 1.3 and E = -0.5 are those of an ordinary tyre, and
     `B = stiffness / (C D)`. The force scales with load (`nominal_load` is the static load).
     """
     return kit.GENERIC_TYRE.magic_formula(stiffness, load)
 
 
 def linear(car: SingleTrack) -> SingleTrack:
-    """The same car on linear tyres of the same cornering stiffness at the static loads: the open-loop baseline.
+    """The same car with linear tyres of the same cornering stiffness at the static loads: the open-loop baseline.
 
-    The stiffness is the slope of each axle's force at zero slip angle, shifts included.
+    The stiffness is the slope of each axle's force at zero slip angle, including shifts.
     """
     axles = [_linear_axle(tyre, load) for tyre, load in zip((car.front, car.rear), car.static_loads(), strict=True)]
     return eqx.tree_at(lambda c: (c.front, c.rear), car, axles)
@@ -70,18 +70,19 @@ def _linear_axle(tyre: AbstractTyre, load: jax.Array) -> Linear:
 
 
 def from_specification(spec) -> SingleTrack:
-    """A single track from a specification of a car: `jaxveh.io.CarSpecification`, or anything with its fields.
+    """A single track from the specification of a car: a `jaxveh.io.CarSpecification`, or anything with its fields.
 
     - `mass` (kg), `yaw_inertia` (kg m^2), `front_axle_to_cg`, `rear_axle_to_cg` (m).
-    - Each axle: its Magic Formula coefficients (`front`, `rear`: B, C, D, E, S_h, S_v, nominal_load) or, where they are
-      None, its cornering stiffness (`front_cornering_stiffness`, `rear_cornering_stiffness`, N/rad), from which
-      `axle_from_stiffness` makes a generic axle.
-    - `cg_height` (m) or None: with one, axle loads follow the longitudinal acceleration, which becomes an input.
-    - `steer_offset` (rad) or None: what the steer channel shows when the car runs straight, so that the car's own
-      `steer_offset`, which is added to the channel, is the negative of it.
-    - `steering`, `rear_steer_ratio`, `rear_steer_ratio_fast`, `rear_steer_speed` or None: what turns which wheels.
+    - Each axle: its Magic Formula coefficients (`front`, `rear`: B, C, D, E, S_h, S_v, nominal_load) or, if they are None, its
+      cornering stiffness (`front_cornering_stiffness`, `rear_cornering_stiffness`, N/rad) for a generic axle by
+      `axle_from_stiffness`.
+    - `cg_height` (m) or None: with a height, axle loads depend on the longitudinal acceleration, which becomes an input.
+    - `steer_offset` (rad) or None: the value of the steer channel when the car runs straight. The car's own `steer_offset` is
+      added to the channel and therefore has the opposite sign.
+    - `steering`, `rear_steer_ratio`, `rear_steer_ratio_fast`, `rear_steer_speed` or None: the steering system.
 
-    **Raises** `InputError` where an axle has neither, and as `SingleTrack` and `MagicFormula` do.
+    **Raises** `InputError` for an axle that has neither coefficients nor a stiffness, and where `SingleTrack` and `MagicFormula`
+    do.
     """
     mass, a, b = spec.mass, spec.front_axle_to_cg, spec.rear_axle_to_cg
     static = {"front": mass * GRAVITY * b / (a + b), "rear": mass * GRAVITY * a / (a + b)}

@@ -1,4 +1,4 @@
-"""The car that rolls, at a given speed: lateral, yaw and roll."""
+"""A car with lateral, yaw and roll motion at a given speed."""
 
 from __future__ import annotations
 
@@ -13,28 +13,29 @@ from jaxveh.vehicles.wheels import body_forces, gravity
 
 
 class Roll3DOF(AbstractToldSpeed, AbstractRollingTwoTrack):
-    """`TwoTrack2DOF` with a body that rolls: lateral, yaw and roll at a given forward speed.
+    """`TwoTrack2DOF` with a rolling body: lateral, yaw and roll motion at a given forward speed.
 
-    Around the roll axis, which joins the roll centres, the sprung mass leans on springs and dampers; all else stays upright. The
-    equations, coupled by the sprung mass's height over the axis, are exact in the roll angle but for the inertias' tilting, and
-    stand in `rolling_body.roll_accelerations`; for small angles and rates they are those of R. Rajamani (Vehicle Dynamics and
-    Control, 2nd ed., ch. 15) and M. Abe (Vehicle Handling Dynamics, ch. 6), there partly in SAE axes, here in ISO 8855: roll is
-    positive with the left side up, which is how a car leans in a left turn, and its centre of gravity then moves by -h sin(phi):
+    The sprung mass rolls on springs and dampers about the roll axis, which joins the roll centres. All other masses stay
+    upright. The equations are coupled by the height of the sprung mass over the roll axis. They are exact in the roll angle,
+    except that the inertias do not tilt, see `rolling_body.roll_accelerations`. For small angles and rates they are those of R.
+    Rajamani (Vehicle Dynamics and Control, 2nd ed., ch. 15) and M. Abe (Vehicle Handling Dynamics, ch. 6), there partly in SAE
+    axes, here in ISO 8855: roll is positive with the left side up, as in a left turn, and the sprung mass then moves by
+    -h sin(phi) to the left:
 
         m (dv_y/dt + v_x r) - m_s h dp/dt           = sum Y_i + m g_y
         I_z dr/dt - I_xz dp/dt                      = sum (x_i Y_i - y_i X_i + M_z,i)
         (I_x + m_s h^2) dp/dt - I_xz dr/dt - m_s h (dv_y/dt + v_x r - g_y) = (m_s g h - K) phi - C p
 
-    The state v_y is the speed of the point on the roll axis below the centre of gravity at rest, and v_x above the forward one
-    there. Inputs, outputs and `motion` (so the place, too) are of the moving centre of gravity of the whole car: its speeds
-    are `rolling_body.swing` ahead of those of the axis, `a_x` and `a_y` what an accelerometer there says. Wheels neither steer
-    nor tilt with roll. Wheel loads are those of `rolling_body.roll_loads`.
+    The state v_y is the lateral speed of the point on the roll axis below the centre of gravity at rest; v_x in these equations
+    is the forward speed of that point. Inputs, outputs and `motion` (and so the position) are those of the moving centre of
+    gravity of the whole car. Its velocity relative to that point is `rolling_body.swing`; `a_x` and `a_y` are the signals of an
+    accelerometer there. Wheels neither steer nor tilt with roll. Wheel loads are those of `rolling_body.roll_loads`.
 
-    **Inputs**: those of `steering` (`steer`, rad at the road wheels), `v_x` (m/s), those of `load_transfer`, and if there is
-    one the longitudinal acceleration, `a_x` (of an ideal accelerometer) or `v_x_rate`; without, the speed counts as constant.
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels), `v_x` (m/s), those of `load_transfer`, and optionally the
+    longitudinal acceleration, `a_x` (of an ideal accelerometer) or `v_x_rate`; without it the speed is assumed constant.
 
-    **Raises** `InputError` for parameters outside their domain (a body that its springs cannot hold upright is), or a tyre that
-    is none.
+    **Raises** `InputError` for parameters outside their domain (including springs too soft to hold the body upright), or a tyre
+    that is not a tyre of `jaxveh.tyres`.
     """
 
     body_states: ClassVar[tuple[str, ...]] = ("v_y", "yaw", "yaw_rate", "roll", "roll_rate")
@@ -45,7 +46,7 @@ class Roll3DOF(AbstractToldSpeed, AbstractRollingTwoTrack):
         push = body_forces(self.places, road.moves, road.forces)
         g_x, g_y, g_z = gravity(ground)
         a_x, a_y = longitudinal_acceleration(centre, u, g_x), push.F_y / self.mass
-        # The force along the car is the one that the given speed takes.
+        # The force along the car is the one required by the given speed.
         found = roll_accelerations(self, x, self.mass * a_x, push.F_y, push.M_z, g_z)
         rates = (
             found.a_y + g_y - self.wheel_speed(x, u) * x.yaw_rate, x.yaw_rate, found.yaw, x.roll_rate, found.roll,

@@ -1,4 +1,4 @@
-"""The car that rolls, driven by torques: longitudinal, lateral, yaw and roll."""
+"""A car with longitudinal, lateral, yaw and roll motion, driven by torques."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from jaxveh.vehicles.wheels import gravity
 
 
 class Roll4DOF(AbstractSpinless, AbstractRollingTwoTrack):
-    """`TwoTrack3DOF` with a body that rolls: longitudinal, lateral, yaw and roll.
+    """`TwoTrack3DOF` with a rolling body: longitudinal, lateral, yaw and roll motion.
 
-    The body leans as that of `Roll3DOF`, with its sources, its signs (roll is positive with the left side up) and what it leaves
-    out; the forward speed is a state:
+    The body rolls as in `Roll3DOF`, with the same sources, signs (roll is positive with the left side up) and simplifications.
+    The forward speed is a state:
 
         m (dv_x/dt - v_y r)                         = sum X_i - drag v_x |v_x| + m g_x
         m (dv_y/dt + v_x r) - m_s h dp/dt           = sum Y_i + m g_y
         I_z dr/dt - I_xz dp/dt                      = sum (x_i Y_i - y_i X_i + M_z,i)
         (I_x + m_s h^2) dp/dt - I_xz dr/dt - m_s h (dv_y/dt + v_x r - g_y) = (m_s g h - K) phi - C p
 
-    The states v_x and v_y are speeds of the point on the roll axis below the centre of gravity at rest. Outputs and `motion` (so
-    the place, too) are of the moving centre of gravity of the whole car: its speeds `rolling_body.swing` ahead of the states',
-    `a_x` and `a_y` what an accelerometer there says. Wheels neither steer nor tilt with roll.
-    Wheel loads are those of `rolling_body.roll_loads`, wheel forces those of the torques as in `TwoTrack3DOF`.
+    The states v_x and v_y are the speeds of the point on the roll axis below the centre of gravity at rest. Outputs and `motion`
+    (and so the position) are those of the moving centre of gravity of the whole car. Its velocity relative to that point is
+    `rolling_body.swing`; `a_x` and `a_y` are the signals of an accelerometer there. Wheels neither steer nor tilt with roll.
+    Wheel loads are those of `rolling_body.roll_loads`, wheel forces follow from the torques as in `TwoTrack3DOF`.
 
     **Inputs**: those of `steering` (`steer`, rad at the road wheels), `drive` and `load_transfer`.
 
-    **Raises** `InputError` for parameters outside their domain (a body that its springs cannot hold upright is), or a tyre that
-    is none.
+    **Raises** `InputError` for parameters outside their domain (including springs too soft to hold the body upright), or a tyre
+    that is not a tyre of `jaxveh.tyres`.
     """
 
     body_states: ClassVar[tuple[str, ...]] = ("v_x", "v_y", "yaw", "yaw_rate", "roll", "roll_rate")

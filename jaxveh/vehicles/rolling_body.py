@@ -1,4 +1,4 @@
-"""The body that rolls on its axles: accelerations of the coupled motions, and the loads that springs and dampers pass on."""
+"""The rolling body: accelerations of the coupled motions, and wheel loads through springs and dampers."""
 
 from __future__ import annotations
 
@@ -20,16 +20,17 @@ NOT_NEGATIVE = ("roll_damping_front", "roll_damping_rear", "roll_centre_front", 
 
 
 class AbstractRollingTwoTrack(AbstractLoadedTwoTrack):
-    """A two-track car whose body leans: its states are the speeds of a point on the roll axis, about which the wheels stay.
+    """A two-track car with a rolling body: its speed states are those of a point on the roll axis, which does not move relative
+    to the wheels.
 
-    **Parameters** of the rolling body: `sprung_mass` (kg, of what rolls), `roll_inertia` (kg m^2, of the sprung mass about its
-    own centre of gravity), `roll_yaw_product` (kg m^2: the integral of x z dm over what rolls, about the point of the roll axis
-    below the car's centre of gravity), `unsprung_height` (m: the centre of gravity of what does not roll), `roll_centre_front`,
-    `roll_centre_rear` (m over the road), `roll_stiffness_front`, `roll_stiffness_rear` (N m/rad, springs and bars),
-    `roll_damping_front`, `roll_damping_rear` (N m s/rad). `load_transfer` is for what passes from body to wheels at once, and
-    for the axles' loads.
+    **Parameters** of the rolling body: `sprung_mass` (kg, the mass that rolls), `roll_inertia` (kg m^2, of the sprung mass about
+    its own centre of gravity), `roll_yaw_product` (kg m^2, the integral of x z dm over the mass that rolls, about the point of
+    the roll axis below the car's centre of gravity), `unsprung_height` (m, of the centre of gravity of the mass that does not
+    roll), `roll_centre_front`, `roll_centre_rear` (m over the road), `roll_stiffness_front`, `roll_stiffness_rear` (N m/rad, of
+    springs and bars), `roll_damping_front`, `roll_damping_rear` (N m s/rad). `load_transfer` gives the accelerations for the
+    axle loads and for the part of the lateral load transfer that does not pass through springs and dampers.
 
-    **Raises** `InputError` for a body that its springs cannot hold upright.
+    **Raises** `InputError` if the springs are too soft to hold the body upright.
     """
 
     _: KW_ONLY
@@ -49,12 +50,12 @@ class AbstractRollingTwoTrack(AbstractLoadedTwoTrack):
         check_rolling_body(self)
 
     def motion(self, x, u):
-        """That of the centre of gravity of the whole car, which leans out; a given speed is its speed already."""
+        """The motion of the centre of gravity of the whole car, which moves with roll. A given speed is that of this point."""
         ahead, aside = swing(self, x)
         return Motion(0.0, 0.0, x.yaw, x.v_x + ahead if hasattr(x, "v_x") else u.v_x, x.v_y + aside, x.yaw_rate)
 
     def wheel_speed(self, x, u):
-        """That of the point on the roll axis, m/s."""
+        """The forward speed of the point on the roll axis, m/s."""
         return x.v_x if hasattr(x, "v_x") else u.v_x - swing(self, x)[0]
 
     def loads(self, x: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
@@ -62,7 +63,7 @@ class AbstractRollingTwoTrack(AbstractLoadedTwoTrack):
 
 
 def check_rolling_body(car: AbstractRollingTwoTrack) -> None:
-    """Raise `InputError` unless the body stands upright on its springs, and its masses and inertias are those of a body."""
+    """Raise `InputError` unless the springs hold the body upright and its masses and inertias are physically possible."""
     kind = type(car).__name__
     for name in NOT_NEGATIVE:
         check(f"{kind}.{name}", getattr(car, name), lambda v: v >= 0, "at least 0")
@@ -70,19 +71,19 @@ def check_rolling_body(car: AbstractRollingTwoTrack) -> None:
     spare = car.yaw_inertia * car.roll_inertia - jnp.square(car.roll_yaw_product)
     check(
         f"{kind}: yaw_inertia * roll_inertia - roll_yaw_product^2", spare, lambda v: v > 0,
-        "positive (kg^2 m^4), or kinetic energy would not be",
+        "positive (kg^2 m^4), so that kinetic energy is positive",
     )  # fmt: skip
     geometry = roll_geometry(car)
     check(f"{kind}: height of the sprung mass over the roll axis", geometry.arm, lambda v: v > 0, "positive (m)")
     left = car.roll_stiffness_front + car.roll_stiffness_rear - car.sprung_mass * GRAVITY * geometry.arm
     check(
         f"{kind}: roll stiffness less sprung weight times its height over the roll axis", left, lambda v: v > 0,
-        "positive (N m/rad), or the car falls over",
+        "positive (N m/rad), or the body falls over",
     )  # fmt: skip
 
 
 class RollGeometry(NamedTuple):
-    """Heights, m: of the sprung mass over the road and over the roll axis (`arm`); masses (kg) that do not roll."""
+    """The heights (m) of the sprung mass over the road and over the roll axis (`arm`), and the mass (kg) that does not roll."""
 
     sprung_height: Any
     arm: Any
@@ -90,9 +91,9 @@ class RollGeometry(NamedTuple):
 
 
 def roll_geometry(car: AbstractRollingTwoTrack) -> RollGeometry:
-    """The sprung mass's place: what the whole car's centre of gravity leaves, once the unsprung mass has its own height.
+    """The position of the sprung mass, from the centre of gravity of the whole car and the height of the unsprung mass.
 
-    The roll axis joins the roll centres; its height counts below the centre of gravity, and its slope does not.
+    The roll axis joins the roll centres. Its height below the centre of gravity is used; its slope is neglected.
     """
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     unsprung = car.mass - car.sprung_mass
@@ -102,17 +103,17 @@ def roll_geometry(car: AbstractRollingTwoTrack) -> RollGeometry:
 
 
 def swing(car: AbstractRollingTwoTrack, x: Any) -> tuple[Any, Any]:
-    """Velocity (forward, left; m/s) of the whole car's centre of gravity, as seen from the point on the roll axis below it.
+    """The velocity (forward, left; m/s) of the whole car's centre of gravity relative to the point on the roll axis below it.
 
-    The leaning body takes it along by -h m_s / m sin(phi) to the left, where it stays while the car turns: in the car's axes
-    that is (h m_s / m) (r sin(phi), -p cos(phi)).
+    Roll moves the centre of gravity by -h m_s / m sin(phi) to the left. With the yaw rate r and the roll rate p its relative
+    velocity in the car's axes is (h m_s / m) (r sin(phi), -p cos(phi)).
     """
     lever = roll_geometry(car).arm * car.sprung_mass / car.mass
     return lever * x.yaw_rate * numerics.sin(x.roll), -lever * x.roll_rate * numerics.cos(x.roll)
 
 
 class RollAccelerations(NamedTuple):
-    """What solves the equations of motion: `a_x`, `a_y` (m/s^2) of the point on the roll axis less gravity's, `yaw`, `roll`
+    """The solution of the equations of motion: `a_x`, `a_y` (m/s^2) of the point on the roll axis without gravity, `yaw`, `roll`
     (rad/s^2)."""
 
     a_x: Any
@@ -122,9 +123,9 @@ class RollAccelerations(NamedTuple):
 
 
 def roll_accelerations(car: AbstractRollingTwoTrack, x: Any, X: Any, Y: Any, N: Any, g_z: Any) -> RollAccelerations:
-    """Solve the car's equations for the accelerations, under forces X, Y (N) and a moment N (N m) about the vertical.
+    """Solve the equations of motion for the accelerations under forces X, Y (N) and a moment N (N m) about the vertical.
 
-    The kinetic energy, with phi the roll, p its rate, r the yaw rate, h the arm, S = m_s h, s and c the sine and cosine of phi,
+    With phi the roll, p its rate, r the yaw rate, h the arm, S = m_s h, s and c the sine and cosine of phi, the kinetic energy
 
         T = m (v_x^2 + v_y^2) / 2 + S (v_x r s - v_y p c) + (I_x + S h) p^2 / 2 + (I_z + S h s^2) r^2 / 2 - I_xz p r
 
@@ -135,7 +136,7 @@ def roll_accelerations(car: AbstractRollingTwoTrack, x: Any, X: Any, Y: Any, N: 
         (I_z + S h s^2) dr/dt - I_xz dp/dt + 2 S h s c p r + S s a_x    = N
         (I_x + S h) dp/dt - I_xz dr/dt - S c a_y - S h s c r^2          = -S g_z s - K phi - C p
 
-    of which a_x and a_y go out, and two by two is left. X / m and Y / m are the accelerations of the centre of gravity.
+    a_x and a_y are eliminated, which leaves two equations. X / m and Y / m are the accelerations of the centre of gravity.
     """
     h = roll_geometry(car).arm
     S, s, c = car.sprung_mass * h, numerics.sin(x.roll), numerics.cos(x.roll)
@@ -156,15 +157,16 @@ def roll_accelerations(car: AbstractRollingTwoTrack, x: Any, X: Any, Y: Any, N: 
 
 
 def roll_loads(car: AbstractRollingTwoTrack, x: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
-    """Wheel loads, N, of a car whose body leans on springs and dampers.
+    """The wheel loads, N, of a car whose body rolls on springs and dampers.
 
-    On each axle, with the share of the masses m_s and m_u that it carries at rest, this moves from the left to the right wheel
-    (W. F. & D. L. Milliken, Race Car Vehicle Dynamics, ch. 18):
+    On each axle, with its share of the masses m_s and m_u at rest, this load moves from the left to the right wheel (W. F. & D.
+    L. Milliken, Race Car Vehicle Dynamics, ch. 18):
 
         (K phi + C p + share a_y (m_s h_rc + m_u h_u)) / track
 
-    The springs' and dampers' part follows the body; the roll centres' (h_rc) and the unsprung mass's follow the a_y that
-    `load_transfer` feels, and the axles' loads its a_x. No wheel is pulled down: one that lifts leaves the load to the other.
+    The part of springs and dampers follows the roll of the body. The parts of the roll centres (h_rc) and of the unsprung mass
+    depend on the a_y of `load_transfer`, the axle loads on its a_x. Loads are never negative: if a wheel lifts, the other wheel
+    carries the load of the axle.
     """
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     unsprung = roll_geometry(car).unsprung_mass
@@ -185,5 +187,5 @@ def roll_loads(car: AbstractRollingTwoTrack, x: Any, a_x: Any, a_y: Any, g_z: An
 
 
 def roll_outputs(x: Any, acceleration: Any) -> dict:
-    """Roll (rad), its rate (rad/s) and acceleration (rad/s^2)."""
+    """The outputs of the roll motion: roll (rad), its rate (rad/s) and acceleration (rad/s^2)."""
     return {"roll": x.roll, "roll_rate": x.roll_rate, "roll_acceleration": acceleration}

@@ -1,4 +1,4 @@
-"""The car of seven degrees of freedom: longitudinal, lateral, yaw, and the spin of four wheels."""
+"""A car with seven degrees of freedom: longitudinal, lateral and yaw motion, and the spin of four wheels."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ SPINS = wheel_names("omega")
 
 
 class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
-    """A rigid car on four wheels that spin: the truth of many papers and the work horse of simulations.
+    """A rigid car on four wheels with spin: the true car of many papers and the standard model of simulations.
 
-    With X_i, Y_i the road's forces on the wheels in the car's axes, (x_i, y_i) the wheels' places, T_i the torques and
+    With X_i, Y_i the road's forces on the wheels in the car's axes, (x_i, y_i) the positions of the wheels, T_i the torques and
     g_x, g_y gravity along a sloping road (R. Rajamani, Vehicle Dynamics and Control, 2nd ed., ch. 8.3; Qin et al. 2014):
 
         m (dv_x/dt - v_y r) = sum X_i - drag v_x |v_x| + m g_x
@@ -38,16 +38,15 @@ class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
         I_z dr/dt           = sum (x_i Y_i - y_i X_i + M_z,i)
         J_w domega_i/dt     = T_i - r_e (F_x,i + f_r F_z,i) - brakes
 
-    Loads follow `load_transfer`. Slips are those of `wheels.contact`; brakes and
-    rolling resistance reverse smoothly about 0.5 m/s, so that standstill is an ordinary point. The spins are stiff: their poles
-    are about `-C_x r_e^2 / (J_w |v|)`, 200 1/s at 20 m/s and thousands at walking speed, which `simulate` looks at when it
-    chooses its solver.
+    Loads follow `load_transfer`. Slips are those of `wheels.contact`. Brakes and rolling resistance change sign smoothly below
+    0.94 m/s (`wheels.STANDSTILL`), so that standstill is a regular point. The spins are stiff: their poles are about
+    `-C_x r_e^2 / (J_w |v|)`, 200 1/s at 20 m/s and thousands at walking speed, from which `simulate` chooses its solver.
 
     **Parameters**: `wheel_inertia` (kg m^2, of one wheel).
 
     **Inputs**: those of `steering` (`steer`, rad at the road wheels), `drive` and `load_transfer`.
 
-    **Raises** `InputError` for parameters outside their domain, or a tyre that is none.
+    **Raises** `InputError` for parameters outside their domain, or a tyre that is not a tyre of `jaxveh.tyres`.
     """
 
     _: KW_ONLY
@@ -59,7 +58,7 @@ class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
         return (*self.steering.inputs, *self.drive.inputs, *self.load_transfer.inputs)
 
     def at_rest(self, v_x):
-        """Wheels that roll freely."""
+        """The spins of freely rolling wheels at `v_x` (m/s)."""
         return dict.fromkeys(SPINS, v_x / self.wheel_radius)
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
@@ -67,7 +66,7 @@ class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
         road = self.on_road(x, u, ground)
         push = body_forces(self.places, road.moves, road.forces)
         g_x, g_y, _ = gravity(ground)
-        # Multiplied by inverses, which belong to the car and not to the instant: a division costs five multiplications.
+        # Multiplication by inverses, which depend on the car only and not on the instant: a division costs five multiplications.
         inverse_mass = 1.0 / self.mass
         a_x = (push.F_x - air_drag(self.drag, x.v_x)) * inverse_mass
         a_y = push.F_y * inverse_mass
@@ -89,7 +88,7 @@ class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
         return each_wheel(lambda omega: omega * self.wheel_radius, wheels_of(x, "omega"))
 
     def steady_a_x(self, x, u, ground: Ground, g: tuple[Any, Any, Any]):
-        """That of the torques, m/s^2, whatever the grip; what no load transfer asks for is never computed."""
+        """The longitudinal acceleration due to the torques, m/s^2, not limited by grip; computed only for loads that use it."""
         del ground, g
         drive, brake = self.drive.torques(u)
         torque = sum_of_wheels(drive) - sum_of_wheels(brake) * travel_direction(x.v_x)

@@ -1,4 +1,4 @@
-"""Parameters that cars of several kinds share, each declared once. They are given by keyword."""
+"""Parameters that several kinds of cars share, each declared once. They are keyword arguments."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from jaxveh.vehicles.steering import AbstractSteeredByRoadWheels
 
 
 class AbstractPlaneBody(AbstractVehicle):
-    """A car that moves as one mass.
+    """A car whose planar motion is that of one mass.
 
     **Parameters** of the body: `mass` (kg) and `yaw_inertia` (kg m^2) of the whole car.
     """
@@ -32,10 +32,10 @@ class AbstractPlaneBody(AbstractVehicle):
 
 
 class AbstractTwoAxle(AbstractSteeredByRoadWheels):
-    """A car on two axles.
+    """A car with two axles.
 
-    **Parameters** of the axles: `front_axle_to_cg`, `rear_axle_to_cg` (m, from the centre of gravity); slips are regularised
-    below `crawl_speed` (m/s).
+    **Parameters** of the axles: `front_axle_to_cg`, `rear_axle_to_cg` (m, from the centre of gravity), and `crawl_speed` (m/s),
+    below which slips are regularised.
 
     **Raises** `InputError` for parameters outside their domain.
     """
@@ -51,12 +51,12 @@ class AbstractTwoAxle(AbstractSteeredByRoadWheels):
 
     @property
     def wheelbase(self) -> jax.Array:
-        """Distance between the axles, m."""
+        """The distance between the axles, m."""
         return self.front_axle_to_cg + self.rear_axle_to_cg
 
 
 class AbstractOneTrack(AbstractTwoAxle, AbstractPlaneBody):
-    """A car whose axles have their wheels in the middle."""
+    """A car on one track: the wheels of each axle lie in its middle."""
 
     @property
     def wheel_positions(self):
@@ -65,11 +65,12 @@ class AbstractOneTrack(AbstractTwoAxle, AbstractPlaneBody):
 
 
 class AbstractOnTyres(AbstractTwoAxle):
-    """A car on tyres, which may have states of their own.
+    """A car with tyres, which may have states of their own.
 
-    **Parameters** of the tyres: `front` and `rear`, the tyre of a wheel on each axle; of a car on one track the axle's.
+    **Parameters** of the tyres: `front` and `rear`, the tyre of one wheel of each axle; for a car on one track that of the
+    whole axle.
 
-    **Raises** `InputError` for a tyre that is none.
+    **Raises** `InputError` for a tyre that is not a tyre of `jaxveh.tyres`.
     """
 
     _: KW_ONLY
@@ -86,29 +87,29 @@ class AbstractOnTyres(AbstractTwoAxle):
     @property
     @abc.abstractmethod
     def tyres(self) -> Any:
-        """The tyres on the wheels: `Tyres`, or on one track `AxleTyres`."""
+        """The tyres of the wheels (`Tyres`), or on one track those of the axles (`AxleTyres`)."""
 
     @property
     @abc.abstractmethod
     def own_states(self) -> tuple[str, ...]:
-        """Names of all states but those of dynamic tyres."""
+        """The names of all states except those of dynamic tyres."""
 
     @abc.abstractmethod
     def contacts(self, x: Any, u: Any, ground: Ground = LEVEL) -> Any:
-        """How the wheels (or axles) touch the road, as the tyres ask for it."""
+        """The contacts of the wheels (or axles) with the road, as the tyres need them."""
 
     def at_rest(self, v_x: Any) -> dict[str, Any]:
-        """Own states that are not zero where the car runs straight at `v_x` (m/s), by name; none unless a car says so."""
+        """Own states that are not zero in straight running at `v_x` (m/s), by name; none unless a vehicle overrides this."""
         del v_x
         return {}
 
     @property
     def state_type(self):
-        """`own_states`, then the states of dynamic tyres: `fl_<name>` ..., on one track `front_<name>`, `rear_<name>`."""
+        """`own_states`, then the states of dynamic tyres: `fl_<name>` ..., or on one track `front_<name>`, `rear_<name>`."""
         return record_type(f"{type(self).__name__}State", (*self.own_states, *self.tyres.state_names))
 
     def start(self, t, u, **values):
-        """Straight running, and dynamic tyres that have settled; a speed that is a state is 0 unless `v_x` (m/s) is given."""
+        """Straight running with dynamic tyres in their steady state. If the speed is a state, it is `v_x` (m/s), by default 0."""
         check_names("start", values, self.state_type._fields)
         dtype = jnp.result_type(self.front_axle_to_cg)
         given = {name: jnp.asarray(value, dtype) for name, value in values.items()}
@@ -120,12 +121,12 @@ class AbstractOnTyres(AbstractTwoAxle):
         return self.state_type(*x, *settled)._replace(**given)
 
     def rates_and_outputs(self, rates: tuple, outputs: dict) -> tuple[Any, Any]:
-        """Rates and outputs, by name, as `evaluate` gives them."""
+        """Rates and outputs, given by name, in the form that `evaluate` returns."""
         return self.state_type(*rates), with_batch_shape(record(f"{type(self).__name__}Outputs", outputs))
 
 
 class AbstractOnAxleTyres(AbstractOnTyres, AbstractOneTrack):
-    """A car on one track with tyres: an axle's are together one law."""
+    """A car on one track with one tyre law per axle."""
 
     @property
     def tyres(self) -> AxleTyres:

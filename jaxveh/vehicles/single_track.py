@@ -23,7 +23,7 @@ from jaxveh.vehicles.wheels import gravity, is_straight, travel_direction
 
 
 class SingleTrackState(NamedTuple):
-    """Lateral velocity of the centre of gravity `v_y` (m/s), `yaw` (rad, unwrapped) and `yaw_rate` (rad/s)."""
+    """The lateral velocity of the centre of gravity `v_y` (m/s), `yaw` (rad, unwrapped) and `yaw_rate` (rad/s)."""
 
     v_y: Any
     yaw: Any
@@ -31,10 +31,10 @@ class SingleTrackState(NamedTuple):
 
 
 class SingleTrackOutputs(NamedTuple):
-    """What can be said of a single track at one instant, at the centre of gravity, in the body's axes.
+    """The outputs of a single track at one instant, at the centre of gravity, in the body's axes.
 
-    Speeds m/s, angles rad, rates rad/s, accelerations m/s^2 (those of an ideal accelerometer), axle
-    forces in the wheel's axes and loads N. `sideslip = atan2(v_y, v_x)`, zero at standstill; `speed` and `course` over ground.
+    Speeds are in m/s, angles in rad, rates in rad/s, accelerations (those of an ideal accelerometer) in m/s^2, axle forces (in
+    the wheel's axes) and loads in N. `sideslip` is `atan2(v_y, v_x)`, zero at standstill; `speed` and `course` are over ground.
     """
 
     v_x: Any
@@ -71,24 +71,24 @@ class SingleTrack(AbstractOnAxleTyres):
     """A vehicle on one track: two axles, a given forward speed, no roll.
 
     In the body's axes, with delta the angle of the front road wheels, a and b the distances of the axles from the centre of
-    gravity, F the axles' lateral forces (paper of Bao, Sabbioni et al. 2015, in the body frame with v_x given):
+    gravity and F the lateral forces of the axles (paper of Bao, Sabbioni et al. 2015, in the body's axes with v_x given):
 
         m (dv_y/dt + v_x r) = F_f cos(delta) + F_r
         J_z dr/dt           = a F_f cos(delta) - b F_r
         alpha_f = delta - atan2(v_y + a r, v_x),   alpha_r = -atan2(v_y - b r, v_x)
 
-    Rear wheels that are steered enter in the same way. Longitudinal forces and moments enter where a tyre law gives them. Slip
-    angles are those of `slip_angle`, regularised so that standstill is an ordinary point.
+    Steered rear wheels enter in the same way. Longitudinal forces and moments enter if the tyre law has them. Slip angles are
+    those of `slip_angle`, regularised so that standstill is a regular point.
 
-    **Parameters**: `cg_height` (m; None: axle loads stay static), `steer_offset` (rad: the front road wheels stand at
+    **Parameters**: `cg_height` (m; None: axle loads are constant), `steer_offset` (rad: the angle of the front road wheels is
     `u.steer + steer_offset`).
 
     **Inputs** u: those of `steering` (`steer`, rad at the road wheels), `v_x` (m/s) and, with a `cg_height`, the longitudinal
-    acceleration: either `a_x`, what an ideal accelerometer at the centre of gravity says, or `v_x_rate = dv_x/dt`,
-    from which `a_x = v_x_rate - v_y r`. Load moves by `m a_x h / (a + b)` from the front to the rear axle.
+    acceleration: either `a_x`, the signal of an ideal accelerometer at the centre of gravity, or `v_x_rate = dv_x/dt`, from
+    which `a_x = v_x_rate - v_y r`. The load `m a_x h / (a + b)` moves from the front to the rear axle.
 
-    **Raises** `InputError` for a mass, inertia, distance or height that is not positive, and for a tyre that is no
-    tyre.
+    **Raises** `InputError` for a mass, inertia, distance or height that is not positive, and for a tyre that is not a tyre of
+    `jaxveh.tyres`.
     """
 
     _: KW_ONLY
@@ -119,7 +119,7 @@ class SingleTrack(AbstractOnAxleTyres):
         return dict(UNITS)
 
     def static_loads(self) -> tuple[jax.Array, jax.Array]:
-        """Loads of front and rear axle at rest on a level road, N."""
+        """The loads of front and rear axle at rest on a level road, N."""
         per_length = self.mass * GRAVITY / self.wheelbase
         return per_length * self.rear_axle_to_cg, per_length * self.front_axle_to_cg
 
@@ -159,7 +159,7 @@ class SingleTrack(AbstractOnAxleTyres):
         return self.state_type(*rates, *tyres.rates(contacts, states)), with_batch_shape(outputs)
 
     def loads(self, x, u, ground: Ground = LEVEL) -> tuple[jax.Array, jax.Array]:
-        """Loads of front and rear axle, N; they may become negative where the car would lift an axle."""
+        """The loads of front and rear axle, N; they can become negative, where a real car would lift an axle."""
         front, rear = self.static_loads()
         if ground is not LEVEL:
             pressed = -gravity(ground)[2] / GRAVITY
@@ -175,11 +175,11 @@ class SingleTrack(AbstractOnAxleTyres):
         return front - moved, rear + moved
 
     def contacts(self, x, u, ground: Ground = LEVEL) -> tuple[Contact, Contact]:
-        """How the front and the rear axle touch the road: slip angles, loads, speeds."""
+        """The contacts of front and rear axle with the road: slip angles, loads, speeds."""
         return self._contacts(x, u, *self._directions(u), ground)
 
     def _directions(self, u) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
-        """(cosine, sine) of each axle's angle; of a rear axle that is not steered (1.0, 0.0)."""
+        """(cosine, sine) of each axle's angle; (1.0, 0.0) for a rear axle that is not steered."""
         front, rear = axle_angles(self.steering.angles(self, u, u.v_x))
         front = front + self.steer_offset
         turned = (1.0, 0.0) if is_straight(rear) else (numerics.cos(rear), numerics.sin(rear))
@@ -207,6 +207,6 @@ class SingleTrack(AbstractOnAxleTyres):
 
 
 def _across(forces: Forces, turn: tuple[Any, Any]) -> Any:
-    """Lateral force of an axle in the car's axes, N."""
+    """The lateral force of an axle in the car's axes, N."""
     cosine, sine = turn
     return forces.F_y if is_straight(sine) else forces.F_y * cosine + forces.F_x * sine

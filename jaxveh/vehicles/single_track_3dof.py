@@ -1,4 +1,4 @@
-"""The single track with forward speed as a state: driven and braked by torques."""
+"""The single-track model with forward speed as a state, driven and braked by torques."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ UNITS = {
 
 
 class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
-    """A vehicle on one track that speeds up and slows down: v_x, v_y and yaw rate.
+    """A vehicle on one track with variable speed: the states are v_x, v_y, yaw and yaw rate.
 
     With X, Y the axles' forces in the car's axes, a and b the axles' distances from the centre of gravity (R. Rajamani, Vehicle
     Dynamics and Control, 2nd ed., ch. 2 and 13.4, on one track):
@@ -40,16 +40,16 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
         m (dv_y/dt + v_x r) = Y_f + Y_r + m g_y
         I_z dr/dt           = a Y_f - b Y_r + M_z,f + M_z,r
 
-    Axles have no spin: their longitudinal forces are torque over radius, as `traction.within_grip` lets them share the road's
-    grip with the lateral forces, and the tyres' own F_x does not count.
-    Load moves between the axles with the a_x that `load_transfer` feels (its a_y does not count: `LaggedLoads` carries it along).
+    Wheel spin is not modelled: the longitudinal forces of the axles are torque over radius, and share the road's grip with the
+    lateral forces as in `traction.within_grip`. The tyres' own F_x has no effect. Load moves between the axles with the a_x of
+    `load_transfer`. The a_y of that has no effect, although `LaggedLoads` has it as a state.
 
-    **Parameters**: `cg_height` (m). Torques of an axle's wheels are added.
+    **Parameters**: `cg_height` (m). The torques of the wheels of an axle are added.
 
     **Inputs**: those of `steering` (`steer`, rad at the road wheels), `drive` and `load_transfer`. **Outputs** have `steer_rear`
-    where the rear axle is steered.
+    if the rear axle is steered.
 
-    **Raises** `InputError` for parameters outside their domain, or a tyre that is none.
+    **Raises** `InputError` for parameters outside their domain, or a tyre that is not a tyre of `jaxveh.tyres`.
     """
 
     _: KW_ONLY
@@ -120,7 +120,7 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
         return self.rates_and_outputs(rates, shown)
 
     def _stand(self, x, u, ground: Ground):
-        """Angles, contacts and motions of the axles."""
+        """The angles, contacts and motions of the axles."""
         g = _, g_y, g_z = gravity(ground)
         steady = self.steady_a_x(x, u, ground, g), x.v_x * x.yaw_rate - g_y
         loads = axle_loads(self, self.load_transfer.felt_accelerations(x, u, steady)[0], g_z)
@@ -136,7 +136,7 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
 
 
 def turn_forces(forces: Forces, move: WheelMotion) -> tuple[Any, Any]:
-    """Forces of an axle along and across the car, N."""
+    """The forces of an axle along and across the car, N."""
     if is_straight(move.sine):
         return forces.F_x, forces.F_y
     return forces.F_x * move.cosine - forces.F_y * move.sine, forces.F_x * move.sine + forces.F_y * move.cosine

@@ -1,4 +1,4 @@
-"""Slip of a wheel from the velocity of its contact point, smooth through standstill."""
+"""The slip of a wheel from the velocity of its contact point, smooth through standstill."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from jaxveh import numerics
 
 
 def regularised_speed(v: jax.Array, crawl: float) -> jax.Array:
-    """|v|, exact from the `crawl` speed (m/s) upwards; below, `crawl (3 + 6 s^2 - s^4) / 8` with `s = v / crawl`.
+    """|v|, exact from the `crawl` speed (m/s) upwards; below it `crawl (3 + 6 s^2 - s^4) / 8` with `s = v / crawl`.
 
-    Twice continuously differentiable, even, and never below `3 crawl / 8`, so that a division by it is safe and the
-    poles of lateral motion, which grow with 1 / |v|, stay within reach of an explicit solver.
+    It is even, twice continuously differentiable and never below `3 crawl / 8`. One can therefore divide by it, and the poles
+    of lateral motion, which grow with 1 / |v|, remain slow enough for an explicit solver.
     """
-    # Bounded before the polynomial, so that the branch not taken cannot overflow.
+    # Bounded before the polynomial, so that the unused branch cannot overflow.
     square = jnp.minimum(jnp.square(v * (1.0 / crawl)), 1.0)
     return jnp.where(jnp.abs(v) >= crawl, jnp.abs(v), (crawl / 8.0) * (3.0 + square * (6.0 - square)))
 
 
 def slip_angle(v_x: jax.Array, v_y: jax.Array, crawl: float) -> jax.Array:
-    """Slip angle, rad, of a wheel whose contact point moves with (v_x, v_y) m/s in the wheel's axes.
+    """The slip angle, rad, of a wheel whose contact point moves with `v_x`, `v_y` (m/s) in the wheel's axes.
 
-    `-atan2(v_y, |v_x|)`: a wheel that slides to the left (v_y > 0) has a negative slip angle and is pushed to the
-    right, forwards and backwards alike. |v_x| is regularised below the `crawl` speed.
+    `-atan2(v_y, |v_x|)`: a wheel that slides to the left (v_y > 0) has a negative slip angle and gets a force to the right, in
+    forward and in backward travel. |v_x| is regularised below the `crawl` speed (m/s).
     """
     return -numerics.arctan2(v_y, regularised_speed(v_x, crawl))

@@ -1,4 +1,4 @@
-"""Any vehicle with a steering wheel: ratio, compliance of the steering, and the torque that the driver holds."""
+"""Any vehicle with a steering wheel: ratio and compliance of the steering, and the driver's torque."""
 
 from __future__ import annotations
 
@@ -15,30 +15,31 @@ from jaxveh.vehicles.base import AbstractVehicle, with_batch_shape
 
 
 class Steered(AbstractVehicle):
-    """`vehicle` steered at the wheel: the input `steer` becomes `steering_wheel` (rad, positive to the left).
+    """`vehicle` with a steering wheel: the input `steer` is replaced by `steering_wheel` (rad, positive to the left).
 
-    Rigid (no `compliance`), the road wheels stand at `steering_wheel / ratio`, without states. With a compliance they turn about
-    their steering axes on the spring of column and rack, `k = 1 / compliance`, and their angle delta is a state, `steer`, so
-    that no equation has to be solved (M. Abe, Vehicle Handling Dynamics, ch. 5):
+    Without a `compliance` the steering is rigid: the angle of the road wheels is `steering_wheel / ratio`, without states. With a
+    compliance the road wheels turn about their steering axes against the spring of column and rack, `k = 1 / compliance`. Their
+    angle delta is the state `steer`, so that there is no algebraic loop (M. Abe, Vehicle Handling Dynamics, ch. 5):
 
         first order  (no `inertia`):  C ddelta/dt = k (steering_wheel / ratio - delta) + M
         second order, `steer_rate`:   J d2delta/dt2 = k (steering_wheel / ratio - delta) + M - C ddelta/dt
         M = sum over the front wheels of (M_z - trail F_y)
 
-    M is the aligning moment about the steering axes; an axle's, where the vehicle is on one track. A vehicle that says no
-    aligning moment (`SingleTrack`) wants the tyres' pneumatic trail within `trail`.
+    M is the aligning moment about the steering axes; for a vehicle on one track it is that of the axle. For a vehicle without an
+    aligning moment among its outputs (`SingleTrack`) `trail` must include the pneumatic trail of the tyres.
 
-    The driver's `steering_torque` (N m, positive where the hands push to the left) is what the spring passes on, over ratio and
-    assistance: `k (steering_wheel / ratio - delta) / (ratio (1 + assist))`; rigid, `-M` is in the place of the spring's moment.
+    The driver's `steering_torque` (N m, positive to the left) is the spring's moment over ratio and assistance,
+    `k (steering_wheel / ratio - delta) / (ratio (1 + assist))`. For a rigid steering `-M` replaces the spring's moment.
 
     **Parameters**: `ratio` (-), `compliance` (rad per N m at the road wheels, both together), `damping` (N m s/rad) and `inertia`
-    (kg m^2) of the road wheels with rack and column about the steering axes, `trail` (m: the contact lies so far behind the
-    steering axis), `assist` (-: what the assistance adds, over what the driver does).
+    (kg m^2) of the road wheels with rack and column about the steering axes, `trail` (m, the distance of the contact behind the
+    steering axis), `assist` (-, the torque of the power assistance over the driver's).
 
-    **Outputs** gain `steering_wheel`, `steer` and, where the vehicle says its front lateral forces, `steering_torque`.
+    **Outputs** also have `steering_wheel`, `steer` and, if the vehicle has front lateral forces among its outputs,
+    `steering_torque`.
 
     **Raises** `InputError` for a vehicle without the input `steer`, parameters outside their domain, an inertia without a
-    compliance, or a compliance on a vehicle that says no front lateral force.
+    compliance, or a compliance for a vehicle without a front lateral force among its outputs.
     """
 
     vehicle: AbstractVehicle
@@ -48,7 +49,7 @@ class Steered(AbstractVehicle):
     inertia: jax.Array | None = positive("kg m^2", default=None)
     trail: jax.Array = parameter("m", scale=0.03, default=0.0)
     assist: jax.Array = parameter("-", scale=1.0, default=0.0)
-    # Kept apart from the parameters, which may be taken out while they are estimated.
+    # Separate from the parameters, because those may be removed from the model while they are estimated.
     own_states: tuple[str, ...] = eqx.field(static=True, default=())
 
     def __init__(self, vehicle, ratio, compliance=None, damping=300.0, inertia=None, trail=0.0, assist=0.0):
@@ -67,7 +68,7 @@ class Steered(AbstractVehicle):
         check_parameters(self)
         check("Steered.assist", self.assist, lambda v: v >= 0, "at least 0")
         if self.inertia is not None and self.compliance is None:
-            raise InputError("Steered.compliance = None: must be given (rad/(N m)) where there is an inertia.")
+            raise InputError("Steered.compliance = None: must be given (rad/(N m)) together with an inertia.")
 
     @property
     def inputs(self):
@@ -75,7 +76,7 @@ class Steered(AbstractVehicle):
 
     @property
     def state_type(self):
-        """The vehicle's; with a compliance `steer` (rad), with an inertia `steer_rate` (rad/s), at its end."""
+        """The vehicle's states, then `steer` (rad) with a compliance and `steer_rate` (rad/s) with an inertia."""
         return record_type("SteeredState", (*self.vehicle.state_type._fields, *self.own_states))
 
     @property
@@ -109,8 +110,8 @@ class Steered(AbstractVehicle):
         if self.own_states:
             if moment is None:
                 raise InputError(
-                    f"Steered.vehicle = {type(self.vehicle).__name__}: says no front lateral force that would twist "
-                    "the steering; compliance must be None."
+                    f"Steered.vehicle = {type(self.vehicle).__name__}: has no front lateral force among its outputs "
+                    "to deflect the steering; compliance must be None."
                 )
             spring = (u.steering_wheel / self.ratio - x.steer) / self.compliance
             own = self._steering_rates(x, spring + moment)
@@ -131,13 +132,13 @@ class Steered(AbstractVehicle):
 
 
 def _steering(u: Any, steer: Any) -> Any:
-    """The vehicle's own inputs: the road wheels' angle in the place of the steering wheel's."""
+    """The vehicle's own inputs: the angle of the road wheels instead of that of the steering wheel."""
     given = {"steer" if name == "steering_wheel" else name: value for name, value in as_mapping(u).items()}
     return record("Inputs", given | {"steer": steer})
 
 
 def _aligning_moment(outputs: Any, trail: Any) -> Any:
-    """Moment of the road on the front wheels about their steering axes, N m; None where the vehicle does not say."""
+    """The moment of the road on the front wheels about their steering axes, N m; None if the vehicle has no such outputs."""
     if hasattr(outputs, "F_y_fl"):
         return (outputs.M_z_fl + outputs.M_z_fr) - trail * (outputs.F_y_fl + outputs.F_y_fr)
     if hasattr(outputs, "F_yf"):

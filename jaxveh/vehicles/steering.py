@@ -1,4 +1,4 @@
-"""Who steers the wheels: from the driver's steering to each wheel's angle."""
+"""Steering systems: from the driver's steering to the angles of the wheels."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from jaxveh.vehicles.base import AbstractVehicle
 from jaxveh.vehicles.wheels import Wheels, front_rear, is_straight, wheel_names, wheels_of
 
 STEER_UNITS = dict.fromkeys(("steer", "steer_rear", *wheel_names("steer")), "rad")
-"""Units of what cars are told of their wheels' angles, and what they say of them."""
+"""The units of the wheel angles among the inputs and outputs of cars."""
 
 
 class AbstractSteering(eqx.Module):
-    """From inputs to the angles of the road wheels (rad, positive to the left).
+    """A steering system: from the inputs to the angles of the road wheels (rad, positive to the left).
 
-    A wheel that is never steered has the Python number 0.0, for which nothing is computed.
+    The angle of a wheel that is never steered is the Python number 0.0, so that nothing is computed for it.
     """
 
     inputs: eqx.AbstractVar[tuple[str, ...]]
@@ -35,14 +35,14 @@ class AbstractSteering(eqx.Module):
 
     @abc.abstractmethod
     def axle_gains(self, v_x: Any) -> tuple[Any, Any]:
-        """Angles of front and rear axle over a small input `steer` (-) at a speed (m/s), other inputs zero.
+        """The angles of front and rear axle over a small input `steer` (-) at the speed `v_x` (m/s), with other inputs zero.
 
         **Raises** `InputError` for a steering without that input.
         """
 
 
 class FrontSteering(AbstractSteering):
-    """Both front wheels turn by `steer`: the ordinary car."""
+    """Both front wheels are turned by the input `steer` (rad): the ordinary car."""
 
     inputs: ClassVar[tuple[str, ...]] = ("steer",)
     front_alone: ClassVar[bool] = True
@@ -57,11 +57,11 @@ class FrontSteering(AbstractSteering):
 
 
 class Ackermann(AbstractSteering):
-    """Front wheels that turn about one point on the rear axle's line, so that the inner one turns further.
+    """Front wheels whose axes meet in one point on the line of the rear axle, so that the inner wheel is turned further.
 
     With L the wheelbase and w half the front track, `tan(delta) = L tan(steer) / (L -+ w tan(steer))` (R. Rajamani, Vehicle
-    Dynamics and Control, 2nd ed., sec. 2.2.1). `share` (-): how much of the way to there from parallel wheels, 1 the whole.
-    A car on one track turns its front axle by the steer. `FourteenDOF` has a parameter `ackermann` for this.
+    Dynamics and Control, 2nd ed., sec. 2.2.1). `share` (-): 0 for parallel wheels, 1 for this geometry, linear between. For a
+    car on one track the angle of the front axle is the steer. `FourteenDOF` has the parameter `ackermann` for this.
 
     **Raises** `InputError` for a share outside -1 to 2.
     """
@@ -86,7 +86,7 @@ class Ackermann(AbstractSteering):
 
 
 class RearSteering(AbstractSteering):
-    """The front wheels turn by `steer`, the rear wheels by `steer_rear` (rad): a rear axle with an actuator."""
+    """The front wheels are turned by the input `steer` (rad), the rear wheels by `steer_rear` (rad), as by a rear actuator."""
 
     inputs: ClassVar[tuple[str, ...]] = ("steer", "steer_rear")
     front_alone: ClassVar[bool] = False
@@ -101,16 +101,16 @@ class RearSteering(AbstractSteering):
 
 
 class FourWheelSteering(AbstractSteering):
-    """The rear wheels turn with the front ones by a ratio, which may go with the speed, as in cars that are sold.
+    """The rear wheels are turned in a ratio to the front wheels, which may depend on speed, as in production cars.
 
-    The rear angle is k `steer`, with k = `rear_ratio` (-) at all speeds; with a `fast_ratio` k goes from `rear_ratio` at
-    standstill to `fast_ratio` at high speed, half of the way at `middle_speed` v_m (m/s):
+    The rear angle is k `steer`, with k = `rear_ratio` (-) at all speeds. With `fast_ratio` (-, at high speed) k changes from
+    `rear_ratio` at standstill to `fast_ratio`; half of the change is reached at `middle_speed` v_m (m/s):
 
         k = (rear_ratio + fast_ratio (v / v_m)^2) / (1 + (v / v_m)^2)
 
-    Negative is against the front wheels (more agile, narrower circles), positive with them (calmer). The form is that of the law
-    of no sideslip (Y. Furukawa, N. Yuhara, S. Sano et al., Vehicle System Dynamics 18 (1989) 151; M. Abe, Vehicle Handling
-    Dynamics, ch. 8), which `steering_without_sideslip` makes.
+    With a negative ratio the rear wheels turn against the front wheels (more agile, narrower circles), with a positive one in
+    the same direction (more stable). The form is that of the law for zero sideslip (Y. Furukawa, N. Yuhara, S. Sano et al.,
+    Vehicle System Dynamics 18 (1989) 151; M. Abe, Vehicle Handling Dynamics, ch. 8), see `steering_without_sideslip`.
 
     **Raises** `InputError` for ratios outside -5 to 5, or a speed that is not positive.
     """
@@ -131,7 +131,7 @@ class FourWheelSteering(AbstractSteering):
             )
 
     def ratio(self, v_x: Any) -> Any:
-        """Rear angle over front angle (-) at a forward speed, m/s."""
+        """The rear angle over the front angle (-) at the forward speed `v_x` (m/s)."""
         if self.fast_ratio is None:
             return self.rear_ratio
         square = v_x * v_x * (1.0 / (self.middle_speed * self.middle_speed))
@@ -157,8 +157,8 @@ class IndependentSteering(AbstractSteering):
 
     def axle_gains(self, v_x):
         raise InputError(
-            "IndependentSteering has no input steer over which a gain could be told: its inputs are "
-            f"{', '.join(self.inputs)}. Take FourWheelSteering or RearSteering for gains."
+            "IndependentSteering has no input steer, so that gains are not defined: its inputs are "
+            f"{', '.join(self.inputs)}. Use FourWheelSteering or RearSteering for gains."
         )
 
 
@@ -169,11 +169,11 @@ STEERINGS: dict[str, Any] = {
     "four-wheel": FourWheelSteering,
     "independent": IndependentSteering,
 }
-"""Kinds of steering by the names that a car's file has for them."""
+"""The kinds of steering by their names in a car's file."""
 
 
 def steering_of(specification: Any) -> AbstractSteering:
-    """The steering that a car's file asks for (`jaxveh.io.CarSpecification`): `steering` and the ratios of rear to front."""
+    """The steering of a car's file (`jaxveh.io.CarSpecification`), from its `steering` and the ratios of rear to front angle."""
     s, kind = specification, getattr(specification, "steering", None) or "front"
     check_one_of("steering", kind, STEERINGS)
     make = STEERINGS[kind]
@@ -184,15 +184,15 @@ def steering_of(specification: Any) -> AbstractSteering:
 
 
 def specification_of_steering(steering: AbstractSteering | None) -> dict[str, Any]:
-    """What a car's file says of a steering, by key: the inverse of `steering_of`; nothing of front wheels that turn alike.
+    """The entries of a car's file for a steering, by key: the inverse of `steering_of`. `FrontSteering` needs none.
 
-    **Raises** `InputError` for one that no file can say: another kind, or an `Ackermann` of another share than 1.
+    **Raises** `InputError` for a steering that no file can describe: another kind, or an `Ackermann` with a share other than 1.
     """
     if steering is None or type(steering) is FrontSteering:
         return {}
     names = {kind: name for name, kind in STEERINGS.items()}
     if type(steering) not in names or (isinstance(steering, Ackermann) and float(steering.share) != 1.0):
-        raise InputError(f"{steering}: a car's file cannot say this steering; it knows {', '.join(STEERINGS)}.")
+        raise InputError(f"{steering}: a car's file cannot describe this steering; it can have {', '.join(STEERINGS)}.")
     found: dict[str, Any] = {"steering": names[type(steering)]}
     if isinstance(steering, FourWheelSteering):
         found["rear_steer_ratio"] = float(steering.rear_ratio)
@@ -205,8 +205,8 @@ def specification_of_steering(steering: AbstractSteering | None) -> dict[str, An
 
 
 def about_one_point(left: Any, right: Any, share: Any, length: Any, half: Any) -> tuple[Any, Any]:
-    """Angles (rad) of both front wheels on the `share` (-) of the way from `left` and `right` to those with which the car turns
-    about one point, `length` (m) behind them; `half` (m) is half their track."""
+    """The angles (rad) of both front wheels: `left` and `right` for a `share` (-) of 0, those of a turn about one point on a line
+    `length` (m) behind the wheels for 1, linear between; `half` (m) is half the track."""
     at_left = numerics.sin(left), numerics.cos(left)
     at_right = at_left if right is left else (numerics.sin(right), numerics.cos(right))
 
@@ -217,7 +217,7 @@ def about_one_point(left: Any, right: Any, share: Any, length: Any, half: Any) -
 
 
 def axle_angles(angles: Wheels) -> tuple[Any, Any]:
-    """Angles of front and rear axle, rad: the mean of their wheels'."""
+    """The angles of front and rear axle, rad: the means over their wheels."""
     return _mean(angles.fl, angles.fr), _mean(angles.rl, angles.rr)
 
 
@@ -226,20 +226,20 @@ def _mean(left: Any, right: Any) -> Any:
 
 
 def steer_outputs(steering: AbstractSteering, angles: Wheels) -> dict[str, Any]:
-    """What a car on four wheels says of their angles: `steer`, the mean of the front wheels', and `steer_fl` ... of each unless
-    they are those of `FrontSteering`."""
+    """The wheel angles among the outputs of a car on four wheels: `steer`, the mean over the front wheels, and, except for
+    `FrontSteering`, `steer_fl` ... of each wheel."""
     steer = {"steer": axle_angles(angles)[0]}
     plain = isinstance(steering, FrontSteering)
     return steer if plain else steer | dict(zip(wheel_names("steer"), angles, strict=True))
 
 
 class AbstractSteeredByRoadWheels(AbstractVehicle):
-    """A car whose road wheels turn.
+    """A car with steered road wheels.
 
-    **Parameters** of the steering: `steering`, what turns which wheels (`FrontSteering`, `Ackermann`, `RearSteering`,
-    `FourWheelSteering`, `IndependentSteering`); on one track an axle has the mean of its wheels' angles.
+    **Parameters** of the steering: `steering` (which wheels are steered and how: a `FrontSteering`, `Ackermann`, `RearSteering`,
+    `FourWheelSteering` or `IndependentSteering`); on one track the angle of an axle is the mean over its wheels.
 
-    **Raises** `InputError` for a steering that is none.
+    **Raises** `InputError` for a steering that is not a steering of `jaxveh.vehicles`.
     """
 
     _: KW_ONLY
@@ -256,18 +256,18 @@ class AbstractSteeredByRoadWheels(AbstractVehicle):
 def steering_without_sideslip(car: Any) -> FourWheelSteering:
     """The steering with which a linear single track (`LinearSingleTrack`) has no sideslip in any steady turn.
 
-    With both slip angles from the axles' shares of the lateral force and no sideslip,
+    The slip angles follow from the axles' shares of the lateral force. With these and zero sideslip,
 
         k(v) = (m a v^2 / (L C_r) - b) / (m b v^2 / (L C_f) + a)
 
     (Y. Furukawa, N. Yuhara, S. Sano et al., Vehicle System Dynamics 18 (1989) 151): k is -b / a at standstill, a C_f / (b C_r) at
     high speed, and halfway at v_m^2 = a C_f L / (m b).
 
-    **Raises** `InputError` for a car without axles' stiffnesses (`linear_single_track` makes one of any car).
+    **Raises** `InputError` for a car without axle stiffnesses (`linear_single_track` makes such a car from any other).
     """
     if not all(hasattr(car, name) for name in ("front_stiffness", "rear_stiffness")):
         raise InputError(
-            f"steering_without_sideslip: {type(car).__name__} has no axle stiffnesses: give linear_single_track(car), which has."
+            f"steering_without_sideslip: {type(car).__name__} has no axle stiffnesses: give linear_single_track(car) instead."
         )
     a, b, C_f, C_r = car.front_axle_to_cg, car.rear_axle_to_cg, car.front_stiffness, car.rear_stiffness
     return FourWheelSteering(

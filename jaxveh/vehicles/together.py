@@ -1,8 +1,8 @@
-"""Tyres of long laws on several wheels at once: one call of the law, an axis of wheels inside it and nowhere else.
+"""Long tyre laws evaluated for several wheels by one call: only inside the call there is an axis of wheels.
 
-Wheels are named scalars because that is fast for laws of a few operations. MF-Tyre has a thousand, and copies of it in each
-stage of a solver compile for minutes. One copy over an axis of four wheels runs as fast (a 7-DOF car on MF-Tyres: 44 s of
-processor time to the first result with four copies, 18 with one; a simulated second takes 0.06 s either way).
+Wheels are named scalars because that is fast for laws of a few operations. MF-Tyre has a thousand, and its copies in each stage
+of a solver take minutes to compile. One copy over an axis of four wheels runs as fast (a 7-DOF car on MF-Tyres: 44 s of
+processor time to the first result with four copies, 18 s with one; a simulated second takes 0.06 s in both cases).
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from jaxveh.tyres import AbstractTyre, MFTyre
 
 
 def long_law(tyre: AbstractTyre) -> bool:
-    """Whether a tyre's law is so long that its copies should be few: there is an MF-Tyre in it."""
+    """Whether a tyre's law is so long that it should have few copies: whether it contains an MF-Tyre."""
     is_mf = lambda node: isinstance(node, MFTyre)
     return any(is_mf(node) for node in jax.tree.leaves(tyre, is_leaf=is_mf))
 
 
 def alike(*tyres: AbstractTyre) -> bool:
-    """Whether tyres are the same law with other numbers, so that one call serves them."""
+    """Whether tyres have the same law with different numbers, so that one call can evaluate all of them."""
     parts = [eqx.partition(tyre, eqx.is_array) for tyre in tyres]
     shapes = [jax.tree.map(jnp.shape, arrays) for arrays, _ in parts]
     return all(
@@ -34,10 +34,10 @@ def alike(*tyres: AbstractTyre) -> bool:
 
 
 def together(function: Callable[..., Any], tyres: tuple, *per_wheel: tuple) -> list:
-    """`function(tyre, ...)` for each wheel by one call: `tyres` (n of them, `alike`), and n of each of what it is given.
+    """`function(tyre, ...)` for each wheel by one call, given n `tyres` (see `alike`) and n values of each other argument.
 
-    Everything is stacked along a new leading axis of n, in front of the batch's; what is the same Python number or None for all
-    wheels stays that.
+    Everything is stacked along a new leading axis of length n, before the axes of the batch. A Python number or None that is the
+    same for all wheels is not stacked.
     """
     n = len(tyres)
     shape = jnp.broadcast_shapes(*[jnp.shape(leaf) for leaf in jax.tree.leaves(per_wheel)])
@@ -55,7 +55,7 @@ def _stack(leaves: tuple, shape: tuple) -> Any:
 
 
 def _one(tyres: tuple, batch: int) -> AbstractTyre:
-    """One tyre whose numbers have the wheels' axis; as it is where all wheels have the same."""
+    """One tyre whose numbers have the axis of wheels; the tyre itself if all wheels have the same object."""
     if all(tyre is tyres[0] for tyre in tyres):
         return tyres[0]
 

@@ -1,4 +1,4 @@
-"""Longitudinal wheel forces straight from the torques, for cars whose wheels have no spin of their own."""
+"""Longitudinal wheel forces directly from the torques, for cars without wheel spin as a state."""
 
 from __future__ import annotations
 
@@ -26,31 +26,31 @@ from jaxveh.vehicles.wheels import (
 )
 
 LEAST_SHARE = 0.1
-"""The share of its lateral force that a wheel keeps however large the torque (as `tyres.Fiala` does): F_x ends at
-`sqrt(1 - 0.1^2)` of the grip, where the ellipse's slope is finite."""
+"""The share of its lateral force that a wheel keeps at any torque (as in `tyres.Fiala`): F_x is at most `sqrt(1 - 0.1^2)` of the
+grip, where the slope of the ellipse is finite."""
 
 _END = (1.0 - LEAST_SHARE**2) ** 0.5
 _CORNER = 0.1
-"""Half the width of the parabola that joins the straight line and the end."""
+"""Half the width of the parabola between the straight line and the limit."""
 
 _LEAST_LIMIT = 1.0
-"""N: so little load cannot be told from a wheel that has lifted, and a division by it is safe."""
+"""N: the lower bound of the limit in the denominator; so small a limit is that of a lifted wheel."""
 
 
 def saturate(wish: Any) -> Any:
-    """`wish` (-) as far as grip allows: exact up to 0.895, at most 0.995, and a parabola between, without a kink."""
+    """The demand `wish` (-), limited by grip: exact up to 0.895, at most 0.995, with a parabola between, so without a kink."""
     held = jnp.clip(wish, -(_END + _CORNER), _END + _CORNER)
     excess = jnp.maximum(jnp.abs(held) - (_END - _CORNER), 0.0)
     return held - jnp.sign(held) * jnp.square(excess) / (4.0 * _CORNER)
 
 
 def within_grip(forces: Forces, wish: Any, limit: Any) -> Forces:
-    """Forces of a tyre at no slip ratio, with the torque's force `wish` (N) in their `F_x`, as an ellipse allows.
+    """The `forces` of a tyre at zero slip ratio combined with the demanded longitudinal force `wish` (N) on a friction ellipse.
 
         F_x = limit s,    F_y = F_y0 sqrt(1 - s^2),    M_z = M_z0 sqrt(1 - s^2),    s = saturated(wish / limit)
 
     `limit` (N) is the greatest longitudinal force (R. Rajamani, Vehicle Dynamics and Control, 2nd ed., ch. 13.4; the friction
-    ellipse of Milliken & Milliken, Race Car Vehicle Dynamics, ch. 2, on forces).
+    ellipse of Milliken & Milliken, Race Car Vehicle Dynamics, ch. 2, applied to forces).
     """
     share = saturate(wish / jnp.maximum(limit, _LEAST_LIMIT))
     left = numerics.sqrt(1.0 - jnp.square(share))
@@ -58,9 +58,9 @@ def within_grip(forces: Forces, wish: Any, limit: Any) -> Forces:
 
 
 class AbstractSpinless(AbstractDriven, AbstractShiftingLoads):
-    """A car whose wheels have no spin of their own: torques over the radius are forces, as far as grip allows.
+    """A car without wheel spin as a state: longitudinal forces are torques over the radius, limited by grip.
 
-    **Parameters** of the grip: `grip` (-), the greatest longitudinal force over load, times the road's friction.
+    **Parameters** of the grip: `grip` (-), the greatest longitudinal force over load on a road of friction 1.
     """
 
     _: KW_ONLY
@@ -71,7 +71,7 @@ class AbstractSpinless(AbstractDriven, AbstractShiftingLoads):
         return (*self.steering.inputs, *self.drive.inputs, *self.load_transfer.inputs)
 
     def steady_a_x(self, x: Any, u: Any, ground: Ground, g: tuple[Any, Any, Any]) -> Any:
-        """a_x, m/s^2, that the torques make, as far as grip allows: what loads can follow without knowing a force."""
+        """The a_x, m/s^2, due to the torques, limited by grip. Loads can follow it without any tyre force being computed."""
         drive, brake = self.drive.torques(u)
         push = (sum_of_wheels(drive) - sum_of_wheels(brake) * travel_direction(x.v_x)) / self.wheel_radius
         limit = self.grip * self.mass * (-g[2] * 0.25 * sum_of_wheels(frictions(ground)))
@@ -79,10 +79,10 @@ class AbstractSpinless(AbstractDriven, AbstractShiftingLoads):
 
 
 def driven_forces(car: AbstractSpinless, forces: Forces, at: Contact, along: Any, drive: Any, brake: Any) -> Forces:
-    """Forces of a wheel (or axle) of `car` under its torques (N m), where it rolls at `along` (m/s).
+    """The forces of a wheel (or axle) of `car` that rolls at `along` (m/s) under the torques `drive` and `brake` (N m).
 
-    The torque less brake and rolling resistance, over the radius, is what the wheel asks of the road; `car.grip` times the
-    road's friction and the load is the most it gets.
+    The demanded force is the drive torque less brake torque and rolling resistance, over the radius. The limit is `car.grip`
+    times the road's friction and the load.
     """
     load = jnp.maximum(at.load, 0.0)
     slowing = brake + car.rolling_resistance * load * car.wheel_radius
@@ -91,8 +91,8 @@ def driven_forces(car: AbstractSpinless, forces: Forces, at: Contact, along: Any
 
 
 class Driven(NamedTuple):
-    """What the road does under the torques of motors and brakes: to the wheels, `road` before them and `forces` under them, and
-    to the body, `push`; `drive`: the motors' torques, N m."""
+    """The forces of the road on a driven car: `road` without the torques of motors and brakes, the wheels' `forces` with them,
+    and their sum on the body, `push`; `drive`: the motors' torques, N m."""
 
     road: OnRoad
     forces: Wheels
@@ -101,7 +101,7 @@ class Driven(NamedTuple):
 
 
 def drive_over_road(car: AbstractSpinless, x: Any, u: Any, ground: Ground) -> Driven:
-    """How the road carries a car whose wheels' forces are `driven_forces`."""
+    """The forces of the road on a car whose wheel forces are `driven_forces`."""
     drive, brake = car.drive.torques(u)
     road = car.on_road(x, u, ground)
     under = lambda force, at, move, *torques: driven_forces(car, force, at, move.along, *torques)
@@ -110,5 +110,5 @@ def drive_over_road(car: AbstractSpinless, x: Any, u: Any, ground: Ground) -> Dr
 
 
 def drive_power(car: AbstractSpinless, drive: Wheels, moves: Wheels) -> Any:
-    """Power of the driving torques, W, on wheels that roll without slip."""
+    """The power of the driving torques, W, on wheels that roll without slip."""
     return sum_of_wheels(each_wheel(lambda torque, move: torque * move.along, drive, moves)) / car.wheel_radius

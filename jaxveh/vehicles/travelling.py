@@ -1,4 +1,4 @@
-"""Any vehicle with its place in the world, on a road that changes along the way."""
+"""Any vehicle with its position in the world, on a road that changes with the position."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class Travelling(AbstractVehicle):
 
         dx/dt = v_x cos(yaw) - v_y sin(yaw),    dy/dt = v_x sin(yaw) + v_y cos(yaw)
 
-    With a `road` (`jaxveh.roads`) its wheels find the friction of the place where each of them stands, and the car the slopes
-    of its place; without, the ground is what `evaluate` is told. Outputs gain `x`, `y` and, with a road, `grade` and `bank`
-    (rad, in the car's directions) and `friction_fl` ...
+    With a `road` (`jaxveh.roads`) each wheel has the friction and the height at its own position, and the car the slopes at its
+    position. Without a road the ground is the argument of `evaluate`. The outputs also have `x`, `y` and, with a road, `grade`
+    and `bank` (rad, in the car's axes), `friction_fl` ... and `height_fl` ...
 
-    **Raises** `InputError` for a road that is none.
+    **Raises** `InputError` for a road that is not a road of `jaxveh.roads`.
     """
 
     vehicle: AbstractVehicle
@@ -36,7 +36,7 @@ class Travelling(AbstractVehicle):
 
     @property
     def state_type(self):
-        """`x`, `y`, then the vehicle's."""
+        """`x`, `y`, then the states of the vehicle."""
         return record_type("TravellingState", (*PLACE, *self.vehicle.state_type._fields))
 
     @property

@@ -1,4 +1,4 @@
-"""What all cars on four wheels have in common: parameters, tyres, units, and the outputs that they offer."""
+"""The common part of all cars on four wheels: parameters, tyres, units and outputs."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ UNITS = {
     **OVER_GROUND,
     **STEER_UNITS,
 }
-"""Units of what two-track cars have as states, inputs and outputs."""
+"""The units of the states, inputs and outputs of two-track cars."""
 
 
 class AbstractTwoTrack(AbstractOnTyres):
     """A car on four wheels.
 
-    **Parameters** of the four wheels: `track_front`, `track_rear` (m, between the wheels' middles), `mirrored`: the tyres of the
-    right wheels are the mirror images of the left ones' (so by default), `cg_height` (m, over the road).
+    **Parameters** of the four wheels: `track_front`, `track_rear` (m, between the wheels' middles), `mirrored`: whether the tyres
+    of the right wheels are mirror images of the left ones (by default they are), `cg_height` (m, over the road).
     """
 
     _: KW_ONLY
@@ -74,13 +74,13 @@ class AbstractTwoTrack(AbstractOnTyres):
 
     @property
     def places(self) -> Wheels:
-        """(x, y), m, of the wheels from the centre of gravity."""
+        """The positions (x, y), m, of the wheels relative to the centre of gravity."""
         return corners(self.front_axle_to_cg, self.rear_axle_to_cg, self.track_front, self.track_rear)
 
 
 class OnRoad(NamedTuple):
-    """How a car's wheels are turned (rad), touch the road and move over it, what the road does to them in their axes, and the
-    rates of dynamic tyres' states."""
+    """The wheels of a car on the road: their angles (rad), contacts and motions, the forces on them in their axes, and the
+    derivatives of the states of dynamic tyres."""
 
     steers: Wheels
     contacts: Wheels
@@ -90,36 +90,36 @@ class OnRoad(NamedTuple):
 
 
 class AbstractLoadedTwoTrack(AbstractTwoTrack, AbstractShiftingLoads):
-    """A two-track car whose wheels keep to the road: their loads follow from the accelerations that `load_transfer` feels.
+    """A two-track car whose wheels stay on the road; their loads follow from the accelerations that `load_transfer` gives.
 
-    Its kinds say what these accelerations are in a steady turn, and how the loads follow.
+    Subclasses define these accelerations in a steady turn and how the loads depend on them.
     """
 
     body_states: eqx.AbstractClassVar[tuple[str, ...]]
-    """Names of the body's and the wheels' states."""
+    """The names of the states of body and wheels."""
 
     @property
     def own_states(self):
         return (*self.body_states, *self.load_transfer.state_names)
 
     def told_or_own_speed(self, x: Any, u: Any) -> Any:
-        """Forward speed, m/s: a state, or given."""
+        """The forward speed, m/s: the state `v_x` if there is one, otherwise the input."""
         return x.v_x if "v_x" in self.body_states else u.v_x
 
     @abc.abstractmethod
     def wheel_speed(self, x: Any, u: Any) -> Any:
-        """Forward speed, m/s, of the point from which the wheels' places are told."""
+        """The forward speed, m/s, of the reference point of the wheels' positions."""
 
     @abc.abstractmethod
     def steady_a_x(self, x: Any, u: Any, ground: Ground, g: tuple[Any, Any, Any]) -> Any:
-        """Longitudinal acceleration, m/s^2, that can be told without knowing a tyre's force, under gravity g (m/s^2)."""
+        """The longitudinal acceleration, m/s^2, computed without any tyre force, under gravity `g` (m/s^2)."""
 
     @abc.abstractmethod
     def loads(self, x: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
-        """Wheel loads, N, under felt accelerations a_x, a_y and gravity g_z across the road (m/s^2)."""
+        """The wheel loads, N, under the accelerations `a_x`, `a_y` and the gravity `g_z` normal to the road (m/s^2)."""
 
     def rim_speeds(self, x: Any) -> Wheels:
-        """`omega r_e` of each wheel, m/s; None where wheels have no spin of their own."""
+        """`omega r_e` of each wheel, m/s; None for cars without wheel spin as a state."""
         del x
         return Wheels(None, None, None, None)
 
@@ -127,14 +127,14 @@ class AbstractLoadedTwoTrack(AbstractTwoTrack, AbstractShiftingLoads):
         return self._stand(x, u, ground)[1]
 
     def on_road(self, x: Any, u: Any, ground: Ground) -> OnRoad:
-        """What the road does to the wheels."""
+        """The wheels on the road: angles, contacts, motions, forces and derivatives of tyre states."""
         steers, contacts, moves = self._stand(x, u, ground)
         tyres = self.tyres
         states = tyres.states(x)
         return OnRoad(steers, contacts, moves, tyres.forces(contacts, states), tyres.rates(contacts, states))
 
     def _stand(self, x, u, ground: Ground) -> tuple[Wheels, Wheels, Wheels]:
-        """Angles, contacts and motions of the wheels."""
+        """The angles, contacts and motions of the wheels."""
         steers = self.steering.angles(self, u, self.told_or_own_speed(x, u))
         moves = rolling_wheels(self.places, self.wheel_speed(x, u), x.v_y, x.yaw_rate, steers)
         g = _, g_y, g_z = gravity(ground)
@@ -145,12 +145,12 @@ class AbstractLoadedTwoTrack(AbstractTwoTrack, AbstractShiftingLoads):
 
 
 def rolling_wheels(places: Wheels, v_x: Any, v_y: Any, yaw_rate: Any, steers: Wheels) -> Wheels:
-    """How wheels at `places` ((x, y), m) that are turned by `steers` (rad) move over the road."""
+    """The motions over the road of wheels at `places` ((x, y), m) with the angles `steers` (rad)."""
     return each_wheel(lambda at, one: rolling(at, v_x, v_y, yaw_rate, *one), places, directions(steers))
 
 
 def directions(steers: Wheels) -> Wheels:
-    """(cosine, sine) of each wheel's angle, once for wheels that share it; (1.0, 0.0) of one that is never steered."""
+    """(cosine, sine) of each wheel's angle, computed once for wheels with the same angle; (1.0, 0.0) if it is never steered."""
     found = {id(angle): (1.0, 0.0) if is_straight(angle) else _cosine_and_sine(angle) for angle in steers}
     return each_wheel(lambda angle: found[id(angle)], steers)
 
@@ -161,12 +161,13 @@ def _cosine_and_sine(steer: Any) -> tuple[Any, Any]:
 
 
 def air_drag(drag: Any, v_x: Any) -> Any:
-    """Drag of the air against the motion, N: `drag` (N s^2/m^2) is half the air's density times c_d times the area."""
+    """The air drag, N, positive forwards: `drag` (N s^2/m^2) is half the air's density times c_d times the area."""
     return drag * v_x * jnp.abs(v_x)
 
 
 def wheel_outputs(contacts: Wheels, forces: Wheels, omegas: Wheels | None = None) -> dict:
-    """What each wheel says, in its own axes: slips, loads, forces, aligning moments, spins; without `omegas` no slip ratio."""
+    """The outputs of each wheel, in its own axes: slips, loads, forces and aligning moments; with `omegas` also slip ratios and
+    spins."""
     shown = {}
     for name in ("slip_angle", "load") if omegas is None else ("slip_angle", "slip_ratio", "load"):
         shown |= zip(wheel_names(name), (getattr(at, name) for at in contacts), strict=True)
@@ -176,8 +177,8 @@ def wheel_outputs(contacts: Wheels, forces: Wheels, omegas: Wheels | None = None
 
 
 def body_outputs(moves: Motion, a_x: Any, a_y: Any, yaw_acceleration: Any, steers: dict, push: BodyForces) -> dict:
-    """What the body says: speeds, accelerations (of an ideal accelerometer), sideslip, speed and course over ground, how the
-    wheels are turned (`steers`: `steer_outputs`), and their forces on it."""
+    """The outputs of the body: speeds, accelerations (of an ideal accelerometer), sideslip, speed and course over ground, the
+    wheel angles (`steers`, from `steer_outputs`) and the sum of the wheels' forces."""
     return {
         "v_x": moves.v_x,
         "v_y": moves.v_y,

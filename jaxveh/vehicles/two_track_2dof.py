@@ -1,4 +1,4 @@
-"""The car on four wheels at a given speed: lateral and yaw."""
+"""A car on four wheels with lateral and yaw motion at a given speed."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from jaxveh.vehicles.wheels import body_forces, gravity
 class TwoTrack2DOF(AbstractToldSpeed, AbstractUprightTwoTrack):
     """A rigid car on four freely rolling wheels at a given forward speed: `SingleTrack` with tracks and lateral load transfer.
 
-    With X_i, Y_i the road's forces on the wheels in the car's axes, (x_i, y_i) their places (R. Rajamani, Vehicle Dynamics and
-    Control, 2nd ed., ch. 8.3, with v_x given):
+    With X_i, Y_i the road's forces on the wheels in the car's axes, (x_i, y_i) their positions (R. Rajamani, Vehicle Dynamics
+    and Control, 2nd ed., ch. 8.3, with v_x given):
 
         m (dv_y/dt + v_x r) = sum Y_i + m g_y
         I_z dr/dt           = sum (x_i Y_i - y_i X_i + M_z,i)
 
     Loads follow `load_transfer`.
 
-    **Inputs**: those of `steering` (`steer`, rad at the road wheels), `v_x` (m/s), those of `load_transfer`, and if there is
-    one the longitudinal acceleration, `a_x` (of an ideal accelerometer) or `v_x_rate`; without, the speed counts as constant.
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels), `v_x` (m/s), those of `load_transfer`, and optionally the
+    longitudinal acceleration, `a_x` (of an ideal accelerometer) or `v_x_rate`; without it the speed is assumed constant.
 
-    **Raises** `InputError` for parameters outside their domain, or a tyre that is none.
+    **Raises** `InputError` for parameters outside their domain, or a tyre that is not a tyre of `jaxveh.tyres`.
     """
 
     body_states: ClassVar[tuple[str, ...]] = ("v_y", "yaw", "yaw_rate")

@@ -1,4 +1,4 @@
-"""The car on four wheels without spin: longitudinal, lateral and yaw, driven and braked by torques."""
+"""A car on four wheels without spin: longitudinal, lateral and yaw motion, driven and braked by torques."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from jaxveh.vehicles.wheels import gravity
 
 
 class TwoTrack3DOF(AbstractSpinless, AbstractUprightTwoTrack):
-    """`SevenDOF` without its stiff spins: wheel forces follow at once from the torques.
+    """`SevenDOF` without its stiff wheel spins: longitudinal wheel forces follow directly from the torques.
 
-    With X_i, Y_i the road's forces on the wheels in the car's axes, (x_i, y_i) their places, g_x, g_y gravity along a sloping
+    With X_i, Y_i the road's forces on the wheels in the car's axes, (x_i, y_i) their positions, g_x, g_y gravity along a sloping
     road (R. Rajamani, Vehicle Dynamics and Control, 2nd ed., ch. 8.3):
 
         m (dv_x/dt - v_y r) = sum X_i - drag v_x |v_x| + m g_x
         m (dv_y/dt + v_x r) = sum Y_i + m g_y
         I_z dr/dt           = sum (x_i Y_i - y_i X_i + M_z,i)
 
-    A wheel's longitudinal force is its torque over the radius, as `traction.within_grip` lets it share the road's grip with the
-    lateral force; the tyre's own F_x does not count. Torques that differ from wheel to wheel (`FourMotors`) turn the car. What
-    spins the wheels up is left out (4 J / r^2 beside the mass: about 3 %). Loads follow `load_transfer`; brakes and
-    rolling resistance change sign smoothly about 0.5 m/s.
+    The longitudinal force of a wheel is its torque over the radius, and shares the road's grip with the lateral force as in
+    `traction.within_grip`. The tyre's own F_x has no effect. Torques that differ between left and right (`FourMotors`) turn the
+    car. The torque that accelerates the wheels' spin is neglected (4 J / r^2 is about 3 % of the mass). Loads follow
+    `load_transfer`. Brakes and rolling resistance change sign smoothly below 0.94 m/s (`wheels.STANDSTILL`).
 
     **Inputs**: those of `steering` (`steer`, rad at the road wheels), `drive` and `load_transfer`.
 
-    **Raises** `InputError` for parameters outside their domain, or a tyre that is none.
+    **Raises** `InputError` for parameters outside their domain, or a tyre that is not a tyre of `jaxveh.tyres`.
     """
 
     body_states: ClassVar[tuple[str, ...]] = ("v_x", "v_y", "yaw", "yaw_rate")

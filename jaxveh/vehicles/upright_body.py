@@ -1,4 +1,4 @@
-"""The two-track car that stays upright."""
+"""Two-track cars without roll."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from jaxveh.vehicles.wheels import Wheels
 
 
 class AbstractUprightTwoTrack(AbstractLoadedTwoTrack):
-    """A two-track car that stays upright: its states are the speeds of its centre of gravity.
+    """A two-track car without roll: its speed states are those of its centre of gravity.
 
-    **Parameters** of the upright body: `front_roll_share` (-), the front axle's share of the lateral load transfer (None: by the
-    static loads).
+    **Parameters** of the upright body: `front_roll_share` (-), the front axle's share of the lateral load transfer (None: as the
+    static loads are shared).
     """
 
     _: KW_ONLY

@@ -103,7 +103,7 @@ def test_bad_input():
     with pytest.raises(InputError, match="shortest = 100"):
         roads.rough("A", KEYS[0], shortest=100.0)
     made = roads.rough("A", KEYS[0])
-    with pytest.raises(InputError, match=r"must be \(n,\) all"):
+    with pytest.raises(InputError, match=r"all must be \(n,\)"):
         dataclasses.replace(made, phases=made.phases[:3])
     with pytest.raises(InputError, match=r"Combined\.height"):
         roads.Combined(roads.Level(), roads.Level(), height=3.0)

@@ -148,7 +148,7 @@ def test_bad_tyres_are_refused():
         tyres.to_property_file(tyres.Brush(8e4, 6e4))
     with pytest.raises(InputError, match=r"lateral\.PKY1 = nan: must be one finite number"):
         tyres.to_property_file(eqx.tree_at(lambda t: t.lateral.PKY1, tyre, jnp.asarray(jnp.nan)))
-    with pytest.raises(InputError, match="tells its own side"):
+    with pytest.raises(InputError, match="has its own side"):
         tyres.to_property_file(tyre, like=tyres.to_property_file(tyre), side="left")
     with pytest.raises(InputError, match="load = -1"):
         tyres.typical_mf_tyre(-1.0)

@@ -52,7 +52,9 @@ def test_free_brakes_are_those_of_the_car():
 
 
 def test_what_has_no_brakes_is_refused():
-    with pytest.raises(InputError, match="AntiLock.vehicle = SingleTrack: must be a car whose wheels spin"):
+    with pytest.raises(
+        InputError, match="AntiLock.vehicle = SingleTrack: must be a car with a drive and with wheel spin"
+    ):
         vehicles.AntiLock(vehicles.passenger_car())
     with pytest.raises(InputError, match="AntiLock.slip_high = 0.1: must be above slip_low"):
         vehicles.AntiLock(car_of(vehicles.SevenDOF), slip_low=0.2, slip_high=0.1)

@@ -44,9 +44,9 @@ STEERED = {kind: name for kind, name in ONE_EACH.items() if hasattr(innermost(CA
 REFUSED = {
     ("Commanded", "RearSteering"): "inputs steer, steer_rear, v_x: must be steer and v_x",
     ("Commanded", "IndependentSteering"): "inputs steer_fl, .*: must be steer and v_x",
-    ("KinematicCrawl", "RearSteering"): "must steer the front wheels alone",
-    ("KinematicCrawl", "FourWheelSteering"): "must steer the front wheels alone.*crawl_speed serves any",
-    ("KinematicCrawl", "IndependentSteering"): "must steer the front wheels alone",
+    ("KinematicCrawl", "RearSteering"): "must steer only the front wheels",
+    ("KinematicCrawl", "FourWheelSteering"): "must steer only the front wheels.*crawl_speed works with any",
+    ("KinematicCrawl", "IndependentSteering"): "must steer only the front wheels",
     ("Steered", "IndependentSteering"): "inputs are steer_fl, .*; steer must be one of them",
 }
 """Who cannot take what, and what it says."""
@@ -312,7 +312,7 @@ def test_the_law_of_no_sideslip_has_none_at_any_speed():
 def test_gains_over_a_steer_that_is_no_input_are_refused():
     car = linear(vehicles.IndependentSteering())
     for gain in (car.yaw_rate_gain, car.sideslip_gain, car.system):
-        with pytest.raises(InputError, match=r"no input steer.*Take FourWheelSteering or RearSteering"):
+        with pytest.raises(InputError, match=r"no input steer.*Use FourWheelSteering or RearSteering"):
             gain(20.0)
 
 
@@ -381,5 +381,5 @@ def test_a_car_s_file_makes_and_remembers_every_steering(name):
 
 def test_a_steering_that_no_file_can_say_is_refused():
     numbers = dataclasses.replace(vehicles.sets.sedan(), steering=vehicles.Ackermann(0.5))
-    with pytest.raises(InputError, match=r"a car's file cannot say this steering; it knows front, ackermann"):
+    with pytest.raises(InputError, match=r"a car's file cannot describe this steering; it can have front, ackermann"):
         vehicles.specification_of(numbers)

@@ -289,7 +289,7 @@ def test_slopes_of_a_car_that_stands_or_slides_are_finite(speed):
         ("roll_damping_rear", -1.0, r"Roll3DOF\.roll_damping_rear = -1\.0: must be at least 0"),
         ("roll_yaw_product", 2000.0, r"roll_yaw_product\^2 = .*must be positive"),
         ("roll_centre_front", 3.0, r"over the roll axis = -.*must be positive"),
-        ("cg_height", 7.0, r"or the car falls over"),
+        ("cg_height", 7.0, r"or the body falls over"),
         ("front", 3.0, r"Roll3DOF\.front = float: must be a tyre"),
     ],
 )

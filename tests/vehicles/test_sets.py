@@ -226,7 +226,7 @@ def test_tyre_files_of_a_cars_file_are_read(tmp_path):
         (lambda: vehicles.named_car("suv", "six-dof"), r"no fidelity 'six-dof' \(did you mean 'seven-dof'"),
         (
             lambda: vehicles.named_car("ferrari_250lm", "seven-dof"),
-            "ferrari_250lm: SevenDOF needs track_front, track_rear, cg_height, which its numbers do not hold",
+            "ferrari_250lm: SevenDOF needs track_front, track_rear, cg_height, missing from its numbers",
         ),
         (lambda: vehicles.named_car("semi_trailer", "linear"), "semi_trailer: LinearSingleTrack needs mass, yaw_inertia"),
         (lambda: vehicles.named_car("sedan", "linear", height=1.0), r"unknown name\(s\) height"),
@@ -238,7 +238,7 @@ def test_tyre_files_of_a_cars_file_are_read(tmp_path):
         ),
         (lambda: CarNumbers("x", "y", 1.2, -1.5), r"x: rear_axle_to_cg = -1\.5: must be positive"),
         (lambda: CarNumbers("x", "y", 1.2, 1.5, front_drive=60.0), r"x: front_drive = 60\.0: must be between 0 and 1"),
-        (lambda: CarNumbers("x", "y", 1.2, 1.5).wheel_loads(), "x: the mass is missing, from which the loads follow"),
+        (lambda: CarNumbers("x", "y", 1.2, 1.5).wheel_loads(), "x: the mass is missing, which the loads need"),
         (lambda: TyreNumbers(-5.0), r"TyreNumbers\.cornering_stiffness = -5\.0"),
         (
             lambda: dataclasses.replace(sets.sedan().suspension, anti_roll_front=-1.0),
@@ -320,5 +320,5 @@ def test_a_file_would_say_the_same_of_a_car_on_one_track(name):
 
 
 def test_what_has_no_mass_has_no_file():
-    with pytest.raises(InputError, match="semi_trailer: mass, yaw_inertia, front, rear must be known"):
+    with pytest.raises(InputError, match="semi_trailer: a car's file needs mass, yaw_inertia, front, rear"):
         vehicles.specification_of(sets.CARS["semi_trailer"]())

@@ -168,7 +168,7 @@ def test_a_vehicle_without_forces_says_no_torque_and_twists_nothing():
     assert out._fields[-2:] == ("steering_wheel", "steer")
     np.testing.assert_allclose(car.motion(car.start(0.0, U), U).yaw_rate, 22.0 * 0.04 / 2.5, rtol=1e-13)
     soft = Steered(cart, 15.0, **COMPLIANT)
-    with pytest.raises(InputError, match=r"Steered\.vehicle = Cart: says no front lateral force"):
+    with pytest.raises(InputError, match=r"Steered\.vehicle = Cart: has no front lateral force"):
         soft.evaluate(0.0, soft.start(0.0, U), U)
 
 

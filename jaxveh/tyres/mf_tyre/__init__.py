@@ -1,10 +1,10 @@
-"""MF-Tyre: the Magic Formula in full, versions 5.2, 6.1 and 6.2, for pure and combined slip; one file a force or moment.
+"""MF-Tyre: the Magic Formula in full, versions 5.2, 6.1 and 6.2, for pure and combined slip.
 
 The equations are those of H. B. Pacejka, Tire and Vehicle Dynamics, 3rd edition (2012), section 4.3.2 ("4.E" numbers), with
 the corrections of Besselink, Schmeitz & Pacejka, An improved Magic Formula/Swift tyre model that can handle inflation
 pressure changes, Vehicle System Dynamics 48 (2010) ("A" numbers), where the reference evaluator MFeval follows them.
-Coefficients keep the names of property files. Inside this folder axes and signs are ISO-W's, where a positive slip angle
-gives a negative force; `MFTyre` is the boundary.
+Coefficients have the names of property files. Inside this package axes and signs are those of ISO-W, where a positive slip
+angle gives a negative force; `MFTyre` converts them. Each force and moment has its own module.
 """
 
 from jaxveh.tyres.mf_tyre.aligning import AligningCoefficients

@@ -70,7 +70,7 @@ class AligningCoefficients(eqx.Module):
         """M_z of combined slip.
 
         `pure`: the `PureLateral` at the point's camber; `weight_y`: G_yk; `forces`: F_x and F_y of combined slip, and the
-        lateral force that acts on the trail: F_y without camber, weighted (4.E74), in version 5.2 F_y less what slip ratio adds.
+        lateral force that acts on the trail: the weighted F_y without camber (4.E74), or in version 5.2 F_y without ply-steer.
         """
         F_x, F_y, on_trail = forces
         slip = _slip_share(at, K_xk, pure.stiffness)
@@ -82,7 +82,7 @@ class AligningCoefficients(eqx.Module):
 
     @numerics.fence_results
     def _trail(self, at, scaling, structure, slip):
-        """Pneumatic trail (4.E73 with A55, A58, A60), m: the other way in backward travel (4.E42)."""
+        """The pneumatic trail (4.E73 with A55, A58, A60), m, with the opposite sign in backward travel (4.E42)."""
         c, camber = self, at.camber
         S_Ht = c.QHZ1 + c.QHZ2 * at.df_z + (c.QHZ3 + c.QHZ4 * at.df_z) * at.sine
         alpha = at.tangent + S_Ht
@@ -94,13 +94,13 @@ class AligningCoefficients(eqx.Module):
         bend = c.QEZ1 + c.QEZ2 * at.df_z + c.QEZ3 * at.df_z**2
         side = 1 + (c.QEZ4 + c.QEZ5 * at.sine) * (2 / math.pi) * numerics.arctan(B * c.QCZ1 * alpha)
         E = curvature(bend * side, at)
-        # The factor LFZO is not in the book; the reference evaluator has it, after TNO's own solver.
+        # The factor LFZO is not in the book. The reference evaluator has it, in agreement with TNO's own solver.
         curve = cosine_curve(_equivalent(alpha, slip), B, c.QCZ1, E) * _cosine_of_course(at)
         return D * curve * at.smooth * scaling.LFZO
 
     @numerics.fence_results
     def _residual(self, at, scaling, structure, pure, slip, weight_y):
-        """Residual torque M_zr (4.E75 with A54), N m: the other way in backward travel (4.E47)."""
+        """The residual torque M_zr (4.E75 with A54), N m, with the opposite sign in backward travel (4.E47)."""
         c = self
         alpha = at.tangent + pure.S_H + pure.S_V / not_zero(pure.stiffness)
         B = c.QBZ9 * _per_friction(scaling.LKY, at.mu_y) + c.QBZ10 * pure.B * pure.C
@@ -118,23 +118,23 @@ class AligningCoefficients(eqx.Module):
 
 @numerics.fence_results
 def _slip_share(at, K_xk, K_ya):
-    """The square of the slip ratio's part in the equivalent slip angles (A54, A55): of the trail's and of the residual's."""
+    """The square of the slip ratio's part in the equivalent slip angles of the trail and of the residual torque (A54, A55)."""
     return (K_xk / not_zero(K_ya)) ** 2 * at.slip_ratio**2
 
 
 def _per_friction(scale, mu):
-    """`scale / mu`; without friction there is no force that the result could act on."""
+    """`scale / mu`, or 0 without friction, where there is no force for which it matters."""
     slippery = mu == 0
     return jnp.where(slippery, 0.0, scale / jnp.where(slippery, 1.0, mu))
 
 
 def _equivalent(alpha, slip):
-    """The slip angle that counts in combined slip (A54, A55); `slip` is the square of the slip ratio's part."""
+    """The equivalent slip angle of combined slip (A54, A55); `slip` is the square of the slip ratio's part."""
     return numerics.arctan(numerics.sqrt(numerics.tan(alpha) ** 2 + slip)) * sign(alpha)
 
 
 @numerics.fence_results
 def _cosine_of_course(at):
-    """cos(alpha'): the wheel's speed over that of its contact centre (4.E6)."""
+    """cos(alpha'): the wheel's forward speed over the speed of its contact centre (4.E6)."""
     course = jnp.abs(at.speed) * jnp.sqrt(1 + numerics.tan(at.slip_angle) ** 2)
     return jnp.abs(at.speed) / (course + EPSILON)

@@ -1,4 +1,4 @@
-"""The sine and cosine curves that all of MF-Tyre is made of, and the declaration of a coefficient."""
+"""The sine and cosine curves of MF-Tyre, and the declaration of a coefficient."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from jaxveh import numerics
 from jaxveh._core.parameter import parameter
 
 EPSILON = 1e-6
-"""What the book adds to denominators (4.E6a)."""
+"""The small number that the book adds to denominators (4.E6a)."""
 
 
 def coefficient(default: float = 0.0, scale: float = 1.0, unit: str = "-"):
-    """Declare a coefficient of a property file: any real number, `default` where a file is silent.
+    """Declare a coefficient of a property file: any real number, with a `default` for files without it.
 
-    `scale` is a typical size, to which relative prior spreads refer.
+    `scale` is a typical size, to which relative prior standard deviations refer.
     """
     return parameter(unit, scale=scale, default=default)
 
 
 def factor():
-    """Declare a scaling factor: 1 where a file is silent."""
+    """Declare a scaling factor, which is 1 for files without it."""
     return coefficient(1.0)
 
 
@@ -30,13 +30,13 @@ def bend(x, E):
 
 
 def sine_curve(x, B, C, D, E):
-    """`D sin(C arctan(B x - E (B x - arctan(B x))))`: forces."""
+    """`D sin(C arctan(B x - E (B x - arctan(B x))))`, for forces."""
     x, B, C, D, E = numerics.fence_blocks((x, B, C, D, E))
     return D * numerics.sin(C * numerics.arctan(bend(B * x, E)))
 
 
 def cosine_curve(x, B, C, E):
-    """`cos(C arctan(B x - E (B x - arctan(B x))))`: trail, and weights of combined slip."""
+    """`cos(C arctan(B x - E (B x - arctan(B x))))`, for the trail and the weights of combined slip."""
     x, B, C, E = numerics.fence_blocks((x, B, C, E))
     return numerics.cos(C * numerics.arctan(bend(B * x, E)))
 
@@ -47,12 +47,12 @@ def weight(x, shift, B, C, E):
 
 
 def curvature(E, at):
-    """E, at most 1 as the book demands, unless the point goes without limits (as in the reference evaluator)."""
+    """E, limited to 1 as the book requires, unless the point is without limits (as in the reference evaluator)."""
     return jnp.minimum(E, 1) if at.bounded else E
 
 
 def sign(x):
-    """1 for x >= 0, else -1."""
+    """1 for x >= 0, otherwise -1."""
     return jnp.where(x >= 0, jnp.ones_like(x), -jnp.ones_like(x))
 
 
@@ -62,10 +62,10 @@ def not_zero(x):
 
 
 def unless_zero(x):
-    """A denominator that odd coefficients make exactly zero: `epsilon` then."""
+    """A denominator that unusual coefficients can make exactly zero; it is `EPSILON` then."""
     return jnp.where(x == 0, EPSILON, x)
 
 
 def cosine_of_arctan(x):
-    """`cos(arctan x)`, which needs neither."""
+    """`cos(arctan x)`, without trigonometry."""
     return 1 / jnp.sqrt(1 + x * x)

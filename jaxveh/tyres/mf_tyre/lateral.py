@@ -37,10 +37,11 @@ class PureLateral(NamedTuple):
 class LateralCoefficients(eqx.Module):
     """The section [LATERAL_COEFFICIENTS].
 
-    Pure slip: shape `PCY1`; friction `PDY1`, with load (`2`) and camber squared (`3`); curvature `PEY1`, with load (`2`), side
-    (`3`), camber (`4`, `5`); stiffness `PKY1`, its load (`2`), with camber (`3`, `5`), form (`4`), of camber (`6`, `7`); shifts
-    `PHY1`, `PHY2`, `PVY1` to `PVY4`, in 5.2 `PHY3`; pressure `PPY1` to `PPY5`. Combined slip: `RBY1` to `RBY4`, `RCY1`, `REY1`,
-    `REY2`, `RHY1`, `RHY2`, `RVY1` to `RVY6`. Relaxation in 5.2: `PTY1`, `PTY2`.
+    Pure slip: shape `PCY1`; friction `PDY1` and its dependence on load (`2`) and camber squared (`3`); curvature `PEY1` and its
+    dependence on load (`2`), side (`3`) and camber (`4`, `5`); stiffness `PKY1`, the load of its maximum (`2`), its dependence
+    on camber (`3`, `5`), its shape over load (`4`), camber stiffness (`6`, `7`); shifts `PHY1`, `PHY2`, `PVY1` to `PVY4`, in 5.2
+    `PHY3`; pressure `PPY1` to `PPY5`. Combined slip: `RBY1` to `RBY4`, `RCY1`, `REY1`, `REY2`, `RHY1`, `RHY2`, `RVY1` to
+    `RVY6`. Relaxation in 5.2: `PTY1`, `PTY2`.
     """
 
     PCY1: jax.Array = coefficient(scale=1.5)
@@ -94,7 +95,7 @@ class LateralCoefficients(eqx.Module):
 
     @numerics.fence_results
     def pure(self, at, scaling, nominal_load, version: int) -> PureLateral:
-        """F_y0 and what it is made of, at the point's camber; `nominal_load` is F_z0 with its scale."""
+        """F_y0 and its components at the point's camber; `nominal_load` is F_z0 times its scaling factor."""
         c, s, sine = self, scaling, at.sine
         K_ya = self._stiffness(at, s, nominal_load, sine)
         S_Vg = at.load * (c.PVY3 + c.PVY4 * at.df_z) * sine * s.LKYC * at.mu_y * at.spin.zeta_2
@@ -121,7 +122,7 @@ class LateralCoefficients(eqx.Module):
         return PureLateral(sine_curve(alpha, B_y, C_y, D_y, E_y) + S_V, K_ya, mu_y, B_y, C_y, S_H, S_V)
 
     def _stiffness(self, at, scaling, nominal_load, sine):
-        """K_ya (4.E25) at a camber's sine, N/rad, negative in ISO-W."""
+        """K_ya (4.E25) at the sine of a camber, N/rad, negative in ISO-W."""
         c = self
         reach = (c.PKY2 + c.PKY5 * sine**2) * (1 + c.PPY2 * at.dp_i)
         K_ya = c.PKY1 * nominal_load * (1 + c.PPY1 * at.dp_i) * (1 - c.PKY3 * jnp.abs(sine)) * scaling.LKY
@@ -131,7 +132,7 @@ class LateralCoefficients(eqx.Module):
 
     @numerics.fence_results
     def weight(self, at, scaling):
-        """G_yk: the share of F_y0 that is left at a slip ratio."""
+        """G_yk: the share of F_y0 that remains at a slip ratio."""
         c = self
         B = (c.RBY1 + c.RBY4 * at.sine**2) * cosine_of_arctan(c.RBY2 * (at.tangent - c.RBY3)) * scaling.LYKA
         E = curvature(c.REY1 + c.REY2 * at.df_z, at)

@@ -24,9 +24,10 @@ class PureLongitudinal(NamedTuple):
 class LongitudinalCoefficients(eqx.Module):
     """The section [LONGITUDINAL_COEFFICIENTS].
 
-    Pure slip: shape `PCX1`; friction `PDX1` at nominal load, with load (`2`) and camber squared (`3`); curvature `PEX1`, with
-    load (`2`, `3`), when driving (`4`); stiffness `PKX1`, with load (`2`, `3`); shifts `PHX1`, `PHX2`, `PVX1`, `PVX2`; pressure
-    `PPX1` to `PPX4`. Combined slip: `RBX1` to `RBX3`, `RCX1`, `REX1`, `REX2`, `RHX1`. Relaxation in 5.2: `PTX1` to `PTX3`.
+    Pure slip: shape `PCX1`; friction `PDX1` at nominal load and its dependence on load (`2`) and camber squared (`3`);
+    curvature `PEX1` and its dependence on load (`2`, `3`) and the slip's sign (`4`); stiffness `PKX1` and its dependence on load
+    (`2`, `3`); shifts `PHX1`, `PHX2`, `PVX1`, `PVX2`; pressure `PPX1` to `PPX4`. Combined slip: `RBX1` to `RBX3`, `RCX1`,
+    `REX1`, `REX2`, `RHX1`. Relaxation in 5.2: `PTX1` to `PTX3`.
     """
 
     PCX1: jax.Array = coefficient(scale=1.5)
@@ -64,7 +65,7 @@ class LongitudinalCoefficients(eqx.Module):
 
     @numerics.fence_results
     def pure(self, at, scaling) -> PureLongitudinal:
-        """F_x0 and what it is made of."""
+        """F_x0 and its components."""
         c, s = self, scaling
         S_Hx = (c.PHX1 + c.PHX2 * at.df_z) * s.LHX * at.smooth
         S_Vx = at.load * (c.PVX1 + c.PVX2 * at.df_z) * s.LVX * at.mu_x * at.spin.zeta_1 * at.smooth
@@ -82,7 +83,7 @@ class LongitudinalCoefficients(eqx.Module):
 
     @numerics.fence_results
     def weight(self, at, scaling):
-        """G_xa: the share of F_x0 that is left at a slip angle."""
+        """G_xa: the share of F_x0 that remains at a slip angle."""
         c = self
         B = (c.RBX1 + c.RBX3 * at.sine**2) * cosine_of_arctan(c.RBX2 * at.slip_ratio) * scaling.LXAL
         return weight(at.tangent, c.RHX1, B, c.RCX1, curvature(c.REX1 + c.REX2 * at.df_z, at))

@@ -1,4 +1,4 @@
-"""The operating point: what every equation of MF-Tyre looks at, prepared once."""
+"""The operating point: the inputs of all equations of MF-Tyre, computed once."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from jaxveh.tyres.mf_tyre.turn_slip import NO_SPIN, Spin
 
 
 class Operating(NamedTuple):
-    """One instant of one wheel, in the signs of ISO-W; arrays that broadcast against each other.
+    """One wheel at one instant, with the signs of ISO-W; arrays that broadcast against each other.
 
-    `load` (N), `moment_load` (N; not below the range's least load, for moments), `slip_ratio` (-), `slip_angle`, `camber`
-    (rad), `speed` (m/s), `pressure` (Pa), all within the tyre's ranges; `df_z`, `dp_i` (-) the increments of load and pressure
-    (4.E2); `tangent`, `sine` the slip angle's tangent and the camber's sine, or the angles themselves in mode 1 (4.E3, 4.E4);
-    `mu_x`, `mu_y` (-) the friction scales with the road's in them; `smooth` (-) what is left of shifts at low speed; `direction`
-    (-) that of travel, sgn V_cx of the book; `spin` what turn slip does; `bounded`: curvatures are held at 1.
+    `load` (N), `moment_load` (N; at least the range's least load, for moments), `slip_ratio` (-), `slip_angle`, `camber` (rad),
+    `speed` (m/s) and `pressure` (Pa), all within the tyre's ranges. `df_z`, `dp_i` (-): the increments of load and pressure
+    (4.E2). `tangent`, `sine`: the slip angle's tangent and the camber's sine, or the angles themselves in mode 1 (4.E3, 4.E4).
+    `mu_x`, `mu_y` (-): the friction scales times the road's friction. `smooth` (-): the factor of shifts at low speed.
+    `direction` (-): the direction of travel, sgn V_cx of the book. `spin`: the factors of turn slip. `bounded`: whether
+    curvatures are limited to 1.
     """
 
     load: Any

@@ -34,7 +34,7 @@ class OverturningCoefficients(eqx.Module):
         check_parameters(self)
 
     def moment(self, at, scaling, structure, least_load, F_y):
-        """M_x, N m; below `least_load` (N) it fades with the load's third power."""
+        """M_x, N m; below `least_load` (N) the load in it is replaced by load^3 / least_load^2."""
         c, camber = self, at.camber
         load = jnp.where(at.load < least_load, at.load**3 / jnp.where(least_load > 0, least_load, 1) ** 2, at.load)
         share, side = load / structure.FNOMIN, F_y / structure.FNOMIN

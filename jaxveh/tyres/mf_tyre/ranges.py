@@ -1,4 +1,4 @@
-"""Where a tyre was measured: slip, camber, load and pressure beyond it are held at its edge."""
+"""The ranges in which a tyre was measured: slip, camber, load and pressure are limited to them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UNLIMITED = 1e10
 class Ranges(eqx.Module):
     """The ranges of a property file: slip ratio `KPUMIN`, `KPUMAX` (-), slip angle `ALPMIN`, `ALPMAX` and camber `CAMMIN`,
     `CAMMAX` (rad), load `FZMIN`, `FZMAX` (N), pressure `PRESMIN`, `PRESMAX` (Pa), and the speed `VXLOW` (m/s) below which slip
-    (unless a vehicle has regularised it) and shifts fade; with a `VXLOW` of zero or less they do not."""
+    (unless a vehicle has regularised it) and shifts fade. They do not fade if `VXLOW` is zero or negative."""
 
     KPUMIN: jax.Array = coefficient(-UNLIMITED)
     KPUMAX: jax.Array = coefficient(UNLIMITED)
@@ -36,7 +36,7 @@ class Ranges(eqx.Module):
         check_parameters(self)
 
     def fading_factors(self, slip_angle, speed):
-        """Factors of slip ratio and slip angle, and the smooth one of shifts, that fade below `VXLOW`."""
+        """The factors of slip ratio and slip angle, and the smooth factor of shifts; all fade below `VXLOW`."""
         fades = self.VXLOW > 0
         lowest = jnp.where(fades, self.VXLOW, 1.0)
         share = jnp.where(fades, jnp.minimum(jnp.abs(speed) / lowest, 1.0), 1.0)

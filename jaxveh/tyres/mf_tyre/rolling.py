@@ -14,8 +14,11 @@ from jaxveh.tyres.mf_tyre.formula import coefficient
 
 
 class RollingCoefficients(eqx.Module):
-    """The section [ROLLING_COEFFICIENTS]: `QSY1` constant, with F_x (`2`), speed (`3`, `4`), camber (`5`, `6`), exponents of load
-    (`7`) and pressure (`8`)."""
+    """The section [ROLLING_COEFFICIENTS].
+
+    Constant part `QSY1`; dependence on F_x `QSY2`, on speed `QSY3`, `QSY4`, on camber `QSY5`, `QSY6`; exponents of load `QSY7`
+    and of pressure `QSY8`.
+    """
 
     QSY1: jax.Array = coefficient(scale=0.01)
     QSY2: jax.Array = coefficient(scale=0.01)
@@ -30,7 +33,7 @@ class RollingCoefficients(eqx.Module):
         check_parameters(self)
 
     def moment(self, at, scaling, structure, ranges, version: int, F_x, load, slip_ratio):
-        """M_y, N m, negative when rolling forward; `load`, `slip_ratio`: as given, not limited."""
+        """M_y, N m, negative when rolling forward; `load` and `slip_ratio` are those of the contact, without limits."""
         c = self
         least = ranges.FZMIN
         load = jnp.where(load < least, load**2 / jnp.where(least > 0, least, 1), load)
@@ -46,10 +49,10 @@ class RollingCoefficients(eqx.Module):
 
     @numerics.fence_results
     def _rolls(self, at, ranges, slip_ratio):
-        """1 for a wheel that rolls forward, -1 backward, smooth between: about the locked wheel, and zero at standstill.
+        """1 if the wheel rolls forward, -1 backward, with a smooth transition about the locked wheel; zero at standstill.
 
-        The bounds are the reference evaluator's, made for a VXLOW of 1 m/s: with others they are not symmetric to the locked
-        wheel.
+        The bounds are those of the reference evaluator, made for a VXLOW of 1 m/s. With other values they are not symmetric
+        about the locked wheel.
         """
         moves = at.speed > 0
         high = ranges.VXLOW / jnp.where(moves, at.speed, 1) - 1
@@ -61,7 +64,7 @@ class RollingCoefficients(eqx.Module):
 
 @numerics.fence_results
 def _power(base, exponent):
-    """`base^exponent` of a base that may be zero, where it and its derivatives are zero."""
+    """`base^exponent`; if the base is zero, the result and its derivatives are zero."""
     some = base > 0
-    # XLA's power takes the CPU ten times as long as an exponential and a logarithm.
+    # On the CPU the power of XLA takes ten times as long as an exponential and a logarithm.
     return jnp.where(some, jnp.exp(exponent * numerics.log(jnp.where(some, base, 1.0))), 0.0)

@@ -1,4 +1,4 @@
-"""User scaling factors: 1 leaves the tyre as it was measured."""
+"""User scaling factors: with 1 the tyre is as measured."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from jaxveh.tyres.mf_tyre.formula import factor
 class Scaling(eqx.Module):
     """The section [SCALING_COEFFICIENTS].
 
-    Of nominal load (`LFZO`); shape, friction, curvature, stiffness and shifts of F_x (`LCX` to `LVX`) and F_y (`LCY` to `LVY`);
-    camber stiffness of F_y and M_z (`LKYC`, `LKZC`); pneumatic trail and residual torque (`LTR`, `LRES`); combined slip (`LXAL`,
-    `LYKA`, `LVYKA`, moment arm `LS`); overturning (`LMX`, `LVMX`), rolling resistance (`LMY`) and parking moment
+    Factors of nominal load (`LFZO`); shape, friction, curvature, stiffness and shifts of F_x (`LCX` to `LVX`) and F_y (`LCY` to
+    `LVY`); camber stiffness of F_y and M_z (`LKYC`, `LKZC`); pneumatic trail and residual torque (`LTR`, `LRES`); combined slip
+    (`LXAL`, `LYKA`, `LVYKA`, moment arm `LS`); overturning (`LMX`, `LVMX`), rolling resistance (`LMY`) and parking moment
     (`LMP`); relaxation lengths of version 5.2 (`LSGKP`, `LSGAL`).
     """
 

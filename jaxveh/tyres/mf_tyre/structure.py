@@ -13,7 +13,7 @@ from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.tyres.mf_tyre.formula import coefficient, unless_zero
 
 RADIUS_ITERATIONS = 12
-"""The rolling radius depends on the wheel's speed, and that on the radius, weakly: a dozen rounds reach the last digit."""
+"""Iterations for the rolling radius: it depends weakly on the wheel's speed, and that on the radius; 12 give full precision."""
 
 
 class Wheel(NamedTuple):
@@ -25,8 +25,8 @@ class Wheel(NamedTuple):
 
 
 class Structure(eqx.Module):
-    """The sections [DIMENSION], [OPERATING_CONDITIONS], [VERTICAL], [STRUCTURAL] and [CONTACT_PATCH], as far as steady forces
-    and relaxation need them: radii, `WIDTH`, nominal load `FNOMIN` (N), pressure `NOMPRES` (Pa) and speed `LONGVL` (m/s),
+    """The entries of the sections [DIMENSION], [OPERATING_CONDITIONS], [VERTICAL], [STRUCTURAL] and [CONTACT_PATCH] that steady
+    forces and relaxation need: radii, `WIDTH`, nominal load `FNOMIN` (N), pressure `NOMPRES` (Pa) and speed `LONGVL` (m/s),
     stiffnesses (N/m) and their dependence on load, speed, forces, pressure and, in 6.2, camber.
 
     **Raises** `InputError` for a radius, load, speed, pressure, width or stiffness that is not positive.
@@ -82,7 +82,7 @@ class Structure(eqx.Module):
         return self.VERTICAL_STIFFNESS * (1 + self.PFZ1 * dp_i)
 
     def wheel(self, load, slip_ratio, speed, dp_i) -> Wheel:
-        """Effective rolling radius (A7), free radius (A1) and speed of a wheel with this slip ratio (book 2.5)."""
+        """The effective rolling radius (A7), free radius (A1) and speed of a wheel with this slip ratio (book 2.5)."""
         share = load / self.FNOMIN
         sinks = self.FNOMIN / self.vertical_stiffness(dp_i)
         sinks = sinks * (self.DREFF * numerics.arctan(self.BREFF * share) + self.FREFF * share)
@@ -95,20 +95,20 @@ class Structure(eqx.Module):
         return Wheel(radius, free, omega)
 
     def deflection(self, load, omega, dp_i, F_x, F_y):
-        """Vertical deflection rho of a loaded, rolling tyre (A2 to A4 solved for it), m."""
+        """The vertical deflection rho of a loaded, rolling tyre (from A2 to A4), m."""
         stiff = self.VERTICAL_STIFFNESS * self.UNLOADED_RADIUS / self.FNOMIN
         q_1 = numerics.sqrt(jnp.maximum(stiff**2 - 4 * self.Q_FZ2, 0.0))
         carries = 1 + self.Q_V2 * self.UNLOADED_RADIUS / self.LONGVL * jnp.abs(omega)
         carries = carries - (self.Q_FCX * F_x / self.FNOMIN) ** 2 - (self.Q_FCY * F_y / self.FNOMIN) ** 2
         carries = jnp.maximum(carries * (1 + self.PFZ1 * dp_i), 1e-12)
-        # q_2 x^2 + q_1 x = load, by the root's form that holds for q_2 = 0 as well.
+        # The root of q_2 x^2 + q_1 x = load, in a form that also holds for q_2 = 0.
         target = load / (carries * self.FNOMIN)
         root = numerics.sqrt(jnp.maximum(q_1**2 + 4 * self.Q_FZ2 * target, 0.0))
         x = 2 * target / unless_zero(q_1 + root)
         return jnp.maximum(x * self.UNLOADED_RADIUS, 0.0)
 
     def loaded_radius(self, load, camber, wheel: Wheel, dp_i, F_x, F_y):
-        """Loaded radius and vertical deflection of version 6.2, m: the radius at which `carried_load` is the load."""
+        """The loaded radius, at which `carried_load` is the load, and the vertical deflection of version 6.2, m."""
         like = wheel.speed * 0 + load * 0 + F_x * 0 + F_y * 0 + camber * 0
         first = self.UNLOADED_RADIUS + like
 
@@ -117,12 +117,13 @@ class Structure(eqx.Module):
             return structure.carried_load(radius, *rest)[0] - load
 
         rest = (camber, wheel, dp_i, F_x, F_y)
-        # Guesses and tolerance are those of the reference evaluator, whose stop within 1e-6 of the nominal load shows.
+        # Starting values and tolerance are those of the reference evaluator: its tolerance of 1e-6 of the nominal load shows in
+        # the result.
         radius = numerics.secant(missing, (self, load + like, *rest), 0.95 * first, first, 1e-6 * self.FNOMIN)
         return radius, self.carried_load(radius, *rest)[1]
 
     def carried_load(self, radius, camber, wheel: Wheel, dp_i, F_x, F_y):
-        """Load at a loaded radius in version 6.2, N, and the deflection, m (MF-Tyre/MF-Swift 6.2 equation manual, 2013)."""
+        """The load (N) and the deflection (m) at a loaded radius in version 6.2 (MF-Tyre/MF-Swift 6.2 equation manual, 2013)."""
         s = self
         free = wheel.free_radius
         share = radius / free

@@ -1,4 +1,4 @@
-"""Turn slip: what a curved path and a wheel that turns on the spot do to forces and moments (Pacejka 4.3.3, 4.75 to 4.105)."""
+"""Turn slip: the effect of a curved path, or of turning on the spot, on forces and moments (Pacejka 4.3.3, 4.75 to 4.105)."""
 
 from __future__ import annotations
 
@@ -52,10 +52,11 @@ class TurnSlip(eqx.Module):
         check_parameters(self)
 
     def spin(self, at, turn_slip, omega, radius, least_speed) -> Spin:
-        """Spin and its factors at an operating point.
+        """The spin and its factors at an operating point.
 
-        `turn_slip` phi_t (1/m), faded and turned with the limits; `omega` (rad/s) and `radius` R_0 (m) of the wheel. The
-        angular speed about the road's normal is that of the path and, reduced by epsilon_gamma, that of a cambered wheel (4.76).
+        `turn_slip` is phi_t (1/m), faded if the tyre has limits; `omega` (rad/s) and `radius` R_0 (m) are those of the wheel.
+        The angular speed about the road's normal is that of the path plus that of a cambered wheel, reduced by epsilon_gamma
+        (4.76).
         """
         c = self
         reduction = c.PECP1 * (1 + c.PECP2 * at.df_z)
@@ -81,9 +82,9 @@ class TurnSlip(eqx.Module):
 
 
 class Spin(NamedTuple):
-    """Spin at an operating point: the factors zeta of the book, `turns` R_0 phi, `path` R_0 phi_t and `reduction` epsilon_gamma.
+    """The spin at an operating point: the factors zeta of the book, `turns` R_0 phi, `path` R_0 phi_t, `reduction` epsilon_gamma.
 
-    Without turn slip the factors are 1 and `coefficients` None.
+    Without turn slip the factors are 1 and `coefficients` is None.
     """
 
     zeta_1: Any = 1.0
@@ -97,17 +98,17 @@ class Spin(NamedTuple):
     coefficients: Any = None
 
     def shift(self, at, K_yg, K_ya0):
-        """S_Hyp: the slip angle by which spin shifts F_y (4.80, 4.85 to 4.89), camber's thrust included."""
+        """S_Hyp: the slip angle by which spin shifts F_y (4.80, 4.85 to 4.89), including camber thrust."""
         c = self.coefficients
         D = c.PHYP2 + c.PHYP3 * at.df_z
         B = K_yg / unless_zero(1 - self.reduction) / unless_zero(c.PHYP1 * D * not_zero(K_ya0))
         return sine_curve(self.turns, B, c.PHYP1, D, curvature(c.PHYP4, at))
 
     def parking(self, at, scaling, aligning, structure, mu_y, weight) -> tuple[Any, Any]:
-        """`D_rphi` (N m), the residual torque's peak by spin, and zeta_7, its shape (4.93 to 4.103).
+        """`D_rphi` (N m), the peak of the residual torque due to spin, and its shape zeta_7 (4.93 to 4.103).
 
-        In (4.99) the slope is that of camber's residual torque, `QDZ8 + QDZ9 df_z` (the reference evaluator multiplies the two).
-        The arccos of zeta_7 holds up to 1.
+        The slope in (4.99) is that of the residual torque over camber, `QDZ8 + QDZ9 df_z` (the reference evaluator multiplies
+        the two). The argument of the arccos in zeta_7 is limited to 1.
         """
         c, a = self.coefficients, aligning
         R_0, nominal = structure.UNLOADED_RADIUS, scaling.LFZO * structure.FNOMIN

@@ -1,4 +1,4 @@
-"""What a property file means where it is silent: a typical car tyre's coefficients."""
+"""Coefficients of a typical car tyre, the defaults for those missing from a property file."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ TYPICAL_COEFFICIENTS = {
     "QSY1": 0.01, "QSY3": 4e-4, "QSY4": 4e-5, "QSY7": 0.85, "QSY8": -0.4,
     "QBZ1": 10.0, "QBZ9": 10.0, "QCZ1": 1.1, "QDZ1": 0.12, "QDZ8": -0.05,
 }  # fmt: skip
-"""By name, in the signs of ISO-W, as the reference evaluator takes them (MFeval 4.3.1, readTIR); what is not here is 0, scales
-are 1. It makes a file without combined slip keep to its friction."""
+"""The default coefficients by name, with the signs of ISO-W, as in the reference evaluator (MFeval 4.3.1, readTIR). All others
+are 0, and scaling factors are 1. With them a file without coefficients of combined slip stays within its friction."""

@@ -1,4 +1,4 @@
-"""MF-Tyre as a tyre of this package: contact in, forces, moments and internals out."""
+"""MF-Tyre as a tyre of this package: forces, moments and internal quantities at a contact."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ VERSIONS = (52, 61, 62)
 
 
 class MFOutputs(NamedTuple):
-    """All that MF-Tyre says of a contact, in the wheel's axes (x forward, y left, z up) and SI units.
+    """All outputs of MF-Tyre at a contact, in the wheel's axes (x forward, y left, z up) and SI units.
 
     Forces and moments; `trail` and residual torque `M_zr`; friction `mu_x`, `mu_y`; slip stiffness `K_xk` (N) and cornering
     stiffness `K_ya` (N/rad, positive here); wheel speed `omega`, effective radius `R_e`, loaded radius `R_l`, deflection `rho`,
@@ -60,17 +60,17 @@ class MFOutputs(NamedTuple):
 class MFTyre(AbstractTyre):
     """MF-Tyre 5.2, 6.1 or 6.2: the Magic Formula in full, pure and combined slip, camber, load and inflation pressure.
 
-    `version` 52, 61 or 62 chooses the equations (62 differs from 61 in the loaded radius alone). `limits`: hold slip, camber,
-    load and pressure within `ranges`, curvatures at 1, and let slip and shifts fade below `ranges.VXLOW`, as the reference
-    evaluator does (but not the slips of a contact with a `slip_speed`, which are regularised already: faded twice, a vehicle
-    that stands would have no forces); `angles`: work with tan(slip angle) and sin(camber) as the book does (False: with the
-    angles); `spins`: the contact's turn slip counts, and camber's share of it, by `turn_slip`. Every coefficient is a leaf,
-    such as `lambda tyre: tyre.lateral.PKY1`.
+    `version` 52, 61 or 62 chooses the equations (62 differs from 61 only in the loaded radius). `limits`: limit slip, camber,
+    load and pressure to `ranges` and curvatures to 1, and let slip and shifts fade below `ranges.VXLOW`, as the reference
+    evaluator does. (The slips of a contact with a `slip_speed` are regularised already and do not fade; otherwise a vehicle at
+    standstill would have no forces.) `angles`: use tan(slip angle) and sin(camber) as the book does (False: the angles).
+    `spins`: include the contact's turn slip, and the spin due to camber, with the coefficients `turn_slip`. Every coefficient is
+    a leaf, such as `lambda tyre: tyre.lateral.PKY1`.
 
-    The contact's load is needed; a speed that it does not tell is LONGVL, a pressure INFLPRES. Its friction multiplies
+    The contact must have a load. Without a speed LONGVL is used, without a pressure INFLPRES. The contact's friction multiplies
     LMUX and LMUY.
 
-    **Raises** `InputError` for an unknown version, turn slip in version 5.2, which has none, or a contact without a load.
+    **Raises** `InputError` for an unknown version, turn slip in version 5.2 (it has none), or a contact without a load.
     """
 
     structure: Structure
@@ -100,7 +100,7 @@ class MFTyre(AbstractTyre):
         return Forces(found.F_x, found.F_y, found.M_x, found.M_y, found.M_z)
 
     def outputs(self, contact: Contact) -> MFOutputs:
-        """Forces, moments and internals at a contact."""
+        """The forces, moments and internal quantities at a contact."""
         if contact.load is None:
             raise InputError("contact.load = None: MFTyre scales with load; give the wheel's load in N.")
         at, s, load = self._operating_point(contact), self.scaling, need_load(contact, "MFTyre")
@@ -109,7 +109,8 @@ class MFTyre(AbstractTyre):
         across = self.lateral.pure(at, s, nominal, self.version)
         weight_y = self.lateral.weight(at, s)
         added = self.lateral.ply_steer(at, s, across.mu)
-        # All three moments read them: 554 instead of 647 ns a contact before jax 0.12 (float64), where it must be here.
+        # All three moments use F_x and F_y. With the fences a contact takes 554 instead of 647 ns before jax 0.12 (float64),
+        # which needs them exactly here.
         F_x = numerics.fence_blocks(self.longitudinal.weight(at, s) * along.force)
         F_y = numerics.fence_blocks(weight_y * across.force + added)
         if self.version == 52:
@@ -128,13 +129,13 @@ class MFTyre(AbstractTyre):
         )  # fmt: skip
 
     def _frictions(self, at: Operating, along, across) -> tuple[Any, Any]:
-        """mu_x and mu_y as the reference evaluator reports them: none off the ground; without the sign of odd files."""
+        """mu_x and mu_y as in the reference evaluator: zero off the ground, and with limits mu_y is positive."""
         mu_y = jnp.abs(across.mu) if self.limits else across.mu
         return jnp.where(at.load > 0, along.mu, 0.0), jnp.where(at.load > 0, mu_y, 0.0)
 
     @numerics.fence_results
     def _operating_point(self, contact: Contact) -> Operating:
-        """The contact within the ranges, in the signs of ISO-W."""
+        """The contact within the ranges, with the signs of ISO-W."""
         structure, r = self.structure, self.ranges
         load = need_load(contact, "MFTyre")
         speed = structure.LONGVL if contact.speed is None else jnp.abs(contact.speed)
@@ -173,7 +174,7 @@ class MFTyre(AbstractTyre):
         return at._replace(spin=self._spin(contact, at)) if self.spins else at
 
     def _spin(self, contact: Contact, at: Operating) -> Spin:
-        """Turn slip: it fades with the slip ratio, and turns with the wheel's course."""
+        """The factors of turn slip, which with limits fades like the slip ratio and is multiplied by cos(slip angle)."""
         phi_t = contact.turn_slip
         if self.limits:
             phi_t = phi_t * numerics.cos(contact.slip_angle) * self.ranges.fading_factors(at.slip_angle, at.speed)[0]
@@ -182,7 +183,7 @@ class MFTyre(AbstractTyre):
         return self.turn_slip.spin(at, phi_t, wheel.speed, self.structure.UNLOADED_RADIUS, self.ranges.VXLOW)
 
     def _body(self, contact: Contact, at: Operating, along, across, F_x, F_y) -> tuple:
-        """From omega to sigma_y of `MFOutputs`."""
+        """The fields of `MFOutputs` from omega to sigma_y."""
         s, structure = self.scaling, self.structure
         load = need_load(contact, "MFTyre")
         wheel = structure.wheel(load, contact.slip_ratio, at.speed, at.dp_i)
@@ -203,8 +204,8 @@ class MFTyre(AbstractTyre):
         return wheel.speed, wheel.effective_radius, R_l, rho, a, b, C_x, C_y, C_z, *sigma
 
     def _manual_relaxation(self, at: Operating, s) -> tuple:
-        """Relaxation lengths of version 5.2, m; of the book's sin(2 arctan(F_z / (PTY2 F_z0))) the form that needs no angle,
-        and that is zero without a load and for a PTY2 of zero, with which truck tyres say that they have no such length."""
+        """The relaxation lengths of version 5.2, m. The book's sin(2 arctan(F_z / (PTY2 F_z0))) is computed without angles; it is
+        zero for zero load and for a PTY2 of zero, which in files of truck tyres means that there is no such length."""
         x, y, R_0 = self.longitudinal, self.lateral, self.structure.UNLOADED_RADIUS
         nominal = s.LFZO * self.structure.FNOMIN
         sigma_x = (x.PTX1 + x.PTX2 * at.df_z) * jnp.exp(-x.PTX3 * at.df_z) * s.LSGKP

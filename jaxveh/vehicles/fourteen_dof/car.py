@@ -1,4 +1,4 @@
-"""The car of fourteen degrees of freedom: a body, four wheels on suspensions, and their spins."""
+"""The car with fourteen degrees of freedom: a body, four wheels on suspensions, and their spins."""
 
 from __future__ import annotations
 
@@ -45,41 +45,44 @@ SPINS = wheel_names("omega")
 
 
 class FourteenDOF(AbstractSuspendedTwoTrack):
-    """A rigid body with all six degrees of freedom, four unsprung masses on springs, four wheels that spin: the truth.
+    """A rigid body with all six degrees of freedom, four unsprung masses on springs and four wheels that spin: the true car.
 
-    The equations are exact for this mechanism, for angles of any size (pitch below 90 degrees), and keep energy:
+    The equations are exact for this mechanism, for angles of any size (pitch below 90 degrees), and conserve energy:
 
-    - A wheel's mass travels along a straight joint fixed in the body, inclined so that the contact point turns about the
-      roll centre (`roll_centre`) and moves forward by `pitch_slope` in bump: in front positive is anti-dive, at the rear
-      negative is anti-squat and anti-lift. Wheels keep their angle to the body: camber is that of the body and `camber`.
-    - `omega` is a wheel's whole spin about its axle. A sensor on the body reads it less the body's turning about the axle,
-      about the pitch rate: the output `omega_to_body`. Spin momentum makes gyroscopic moments; a turning steer makes none.
-    - A tyre is a spring and a damper in the wheel's plane that never pull; its contact point is where that plane, below the
-      centre, meets the road.
-      It rolls with the unloaded radius less a third of the compression, which is also the arm of its longitudinal force
-      about the axle: with the smaller loaded radius tyres would make energy. M_x, M_y, M_z of the tyre count; that of
-      rolling resistance reverses its sign with the direction of travel, and `rolling_resistance` comes on top.
-    - The road is the plane of x and y, over which a road's `height` lifts each tyre's contact point as it is: it tilts no force,
-      and the tyre's damping does not feel how fast it changes. Slopes tilt gravity. The air's drag acts on the sprung mass'
-      centre of gravity.
+    - The mass of a wheel moves along a straight joint fixed in the body. The joint is inclined so that the contact point turns
+      about the roll centre (`roll_centre`) and moves forward by `pitch_slope` per metre of bump travel: in front a positive
+      slope is anti-dive, at the rear a negative one is anti-squat and anti-lift. Wheels keep their angle to the body: the camber
+      is that of the body plus `camber`.
+    - `omega` is the total spin of a wheel about its axle. A sensor on the body measures it less the body's angular velocity
+      about the axle (about the pitch rate), the output `omega_to_body`. The wheels' angular momentum causes gyroscopic moments,
+      except that of a changing steer.
+    - A tyre is a spring and a damper in the wheel's plane, and its load is never negative. The contact point is where this plane
+      meets the road below the centre. The tyre rolls with the unloaded radius less a third of the compression, which is also the
+      arm of its longitudinal force about the axle: with the smaller loaded radius the tyres would generate energy. The tyre's
+      moments M_x, M_y, M_z are included; that of rolling resistance reverses its sign with the direction of travel, and
+      `rolling_resistance` is added to it.
+    - The road is the plane of x and y. A road's `height` raises the contact point of each tyre: it does not tilt the forces, and
+      its rate of change does not enter the tyre's damping. Slopes tilt gravity. Air drag acts on the centre of gravity of the
+      sprung mass.
 
-    Speeds, place and accelerations are those of the *sprung mass'* centre of gravity, in the intermediate axes (x, y in the
-    road's plane); `a_x`, `a_y`, `a_z` are what an ideal accelerometer there says in these axes (a_z = g at rest). Springs
-    are preloaded for rest on a level road, where `start` puts the car. Slips are those of `wheels.contact`; brakes and
-    rolling resistance change sign smoothly about 0.5 m/s. Wheel hop (about 10 Hz) and spins (see `SevenDOF`) are stiff.
+    Speeds, position and accelerations are those of the centre of gravity of the *sprung mass*, in the intermediate axes (x, y in
+    the road's plane). `a_x`, `a_y`, `a_z` are the signals of an ideal accelerometer there in these axes (a_z = g at rest).
+    Springs are preloaded for rest on a level road, the position of `start`. Slips are those of `wheels.contact`. Brakes and
+    rolling resistance change sign smoothly below 0.94 m/s (`wheels.STANDSTILL`). Wheel hop (about 10 Hz) and spins (see
+    `SevenDOF`) are stiff.
 
-    Equations: d'Alembert's principle, see `dynamics.accelerations`. The degrees of freedom are those of T. Shim and C. Ghike,
-    Vehicle System Dynamics 45 (2007) 191, with joints inclined for the roll centres and nothing linearised.
+    The equations follow from d'Alembert's principle, see `dynamics.accelerations`. The degrees of freedom are those of T. Shim
+    and C. Ghike, Vehicle System Dynamics 45 (2007) 191, here with joints inclined for the roll centres and without linearisation.
 
     **Inputs**: those of `steering` (`steer`, rad at the road wheels) and of `drive`.
 
-    **Outputs** beside those of `SevenDOF`: `z`, `v_z`, `roll`, `pitch`, their rates and accelerations, `a_z`, `camber_fl`,
-    `travel_fl` (m, up), `travel_rate_fl`, `suspension_force_fl` (N), `omega_to_body_fl` (rad/s), `M_x_fl`, `M_y_fl` ..., and the
-    powers (W) that leave the car: `tyre_dissipation` (slip, moments, rolling, tyre damping), `damper_dissipation`,
-    `brake_dissipation`, `drag_dissipation`. With `drive_power` they balance the energy.
+    **Outputs** in addition to those of `SevenDOF`: `z`, `v_z`, `roll`, `pitch`, their rates and accelerations, `a_z`,
+    `camber_fl`, `travel_fl` (m, up), `travel_rate_fl`, `suspension_force_fl` (N), `omega_to_body_fl` (rad/s), `M_x_fl`, `M_y_fl`
+    ..., and the powers (W) that leave the car: `tyre_dissipation` (slip, moments, rolling, tyre damping), `damper_dissipation`,
+    `brake_dissipation`, `drag_dissipation`. With `drive_power` they balance the change of energy.
 
     **Raises** `InputError` for parameters outside their domain, an inertia that is not positive definite, tyres too soft to
-    carry the car, or a tyre that is none.
+    carry the car, or a tyre that is not a tyre of `jaxveh.tyres`.
     """
 
     def __check_init__(self):
@@ -88,7 +91,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
 
     @property
     def mass(self) -> jax.Array:
-        """Mass of the whole car, kg."""
+        """The mass of the whole car, kg."""
         return self.sprung_mass + 2.0 * (self.unsprung_mass_front + self.unsprung_mass_rear)
 
     @property
@@ -97,7 +100,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
 
     @property
     def own_states(self):
-        """The body's states, travels and their rates, spins."""
+        """The states of the body, then travels, their rates and spins."""
         return (*BODY, *wheel_names("travel"), *wheel_names("travel_rate"), *SPINS)
 
     @property
@@ -108,7 +111,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
         return Motion(0.0, 0.0, x.yaw, x.v_x, x.v_y, x.yaw_rate)
 
     def at_rest(self, v_x):
-        """On its springs on a level road, or rolling there freely with `v_x` (m/s)."""
+        """The height and the spins on a level road, at rest or rolling freely with `v_x` (m/s)."""
         spins = [v_x / (self.wheel_radius - ROLLING_SHARE * sunk) for sunk in sunk_at_rest(self)]
         return {"z": self.cg_height, **dict(zip(SPINS, spins, strict=True))}
 
@@ -116,7 +119,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
         return self._stand(x, self._steers(x, u), ground).contacts
 
     def _steers(self, x, u) -> Wheels:
-        """Angles of the wheels, rad, before `ackermann` and toe."""
+        """The angles of the wheels, rad, without `ackermann` and toe."""
         return self.steering.angles(self, u, x.v_x)
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
@@ -170,7 +173,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
 
     @numerics.fence_results
     def _stand(self, x, steers: Wheels, ground: Ground) -> Stand:
-        """How the car stands on the road, before any tyre force."""
+        """The position of body and wheels on the road, computed without tyre forces."""
         body = body_of(x)
         wheels = each_wheel(
             lambda joint, travel, rate: wheel_at(joint, travel, rate, body),
@@ -185,7 +188,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
 
     @numerics.fence_results
     def _shafts(self, stand: Stand, u, omegas: Wheels) -> Wheels:
-        """Torques of motors and brakes, which sit on the body."""
+        """The torques of motors and brakes, which react on the body."""
         drive, brake = self.drive.torques(u)
 
         def one(axis, how, omega, driving, braking):
@@ -196,7 +199,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
         return each_wheel(one, stand.axles, stand.touches, omegas, drive, brake)
 
     def _accelerate(self, x, stand: Stand, roads, shafts, suspension, omegas, g: Vector) -> Accelerations:
-        """Gravity, drag and the reactions of torques on the body; gravity and the road on the wheels."""
+        """The accelerations under gravity, drag and reaction torques on the body, and gravity and the road on the wheels."""
         axes = stand.body.axes
         g = to_body(axes, g)
         force = add(times(self.sprung_mass, g), times(-air_drag(self.drag, x.v_x), axes.forward))
@@ -218,7 +221,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
 
 
 class Stand(NamedTuple):
-    """How the car stands on the road: the body, each wheel's centre, axis (body's axes), contact and touch."""
+    """The car on the road: the body, and for each wheel its centre, axis (in the body's axes), contact and `Touch`."""
 
     body: Body
     wheels: Wheels
@@ -228,7 +231,7 @@ class Stand(NamedTuple):
 
 
 class Shaft(NamedTuple):
-    """Torque on a wheel (N m), its spin as seen from the body (rad/s), power of its motor and power lost in its brake (W)."""
+    """The torque on a wheel (N m), its spin relative to the body (rad/s), the power of its motor and that of its brake (W)."""
 
     torque: Any
     turns: Any
@@ -237,6 +240,6 @@ class Shaft(NamedTuple):
 
 
 def _below(body: Body, wheel: Wheel, how: Touch) -> tuple[Any, Any]:
-    """Where a wheel touches the road: x, y (m) in the intermediate axes from the centre of gravity."""
+    """The contact point of a wheel: x, y (m) from the centre of gravity, in the intermediate axes."""
     at = add(to_road(body.axes, wheel.place), how.arm)
     return at.x, at.y

@@ -1,4 +1,4 @@
-"""What the parameters of the car of fourteen degrees of freedom must hold."""
+"""Conditions on the parameters of the car with fourteen degrees of freedom."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ NOT_NEGATIVE = (
 
 
 def check_fourteen_dof(car: AbstractSuspendedTwoTrack) -> None:
-    """Raise `InputError` unless the inertia is positive definite, the tyres carry the car, and the front wheels' angles are those
-    of the steering or of `ackermann`, not of both."""
+    """Raise `InputError` unless the inertia is positive definite, the tyres can carry the car, and only one of the steering and
+    `ackermann` gives the front wheels different angles."""
     kind = type(car).__name__
     if isinstance(car.steering, Ackermann | IndependentSteering):
-        told = f"0 with {type(car.steering).__name__}, which says each front wheel's own angle"
+        told = f"0 with {type(car.steering).__name__}, which sets the angle of each front wheel"
         check(f"{kind}.ackermann", car.ackermann, lambda v: v == 0, told)
     for name in NOT_NEGATIVE:
         check_at_least(f"{kind}.{name}", getattr(car, name), 0)
     if is_concrete(car.roll_inertia, car.yaw_inertia):
         most = np.sqrt(np.asarray(car.roll_inertia) * np.asarray(car.yaw_inertia))
-        limit = "below sqrt(roll_inertia yaw_inertia) in size (kg m^2): the inertia is positive definite"
+        limit = "below sqrt(roll_inertia yaw_inertia) in size (kg m^2), so that the inertia is positive definite"
         check(f"{kind}.roll_yaw_product", car.roll_yaw_product, lambda v: np.abs(v) < most, limit)
     loads = static_loads(car)
     if is_concrete(loads, car.wheel_radius):
         least = np.maximum(np.asarray(loads.fl), np.asarray(loads.rl)) / np.asarray(car.wheel_radius)
-        limit = "above static load / wheel_radius (N/m), or the rim stands on the road"
+        limit = "above static load / wheel_radius (N/m), or the tyre is compressed to the wheel's centre at rest"
         check(f"{kind}.tyre_stiffness", car.tyre_stiffness, lambda v: v > least, limit)

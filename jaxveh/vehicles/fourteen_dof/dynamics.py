@@ -1,4 +1,4 @@
-"""The equations of motion of a body with four masses on prismatic joints, exact and without an axis of vectors."""
+"""The exact equations of motion of a body with four masses on prismatic joints, written with named scalars."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ class Inertia(NamedTuple):
 
 
 class Accelerations(NamedTuple):
-    """Of the body's centre of gravity (m/s^2) and of its turning (rad/s^2), in its axes; of each wheel's travel (m/s^2)."""
+    """The accelerations of the body's centre of gravity (m/s^2) and of its rotation (rad/s^2), in its axes, and those of the
+    wheels' travels (m/s^2)."""
 
     linear: Vector
     angular: Vector
@@ -39,16 +40,16 @@ def accelerations(
     on_wheels: Wheels,
     suspension: Wheels,
 ) -> Accelerations:
-    """Accelerations of all masses, in the body's axes.
+    """The accelerations of all masses, in the body's axes.
 
-    `force` (N) and `moment` (N m) act on the body at its centre of gravity, gravity included; `on_wheels` (N) on the wheels'
-    centres, gravity included; `suspension` (N) along each joint, pushing the wheel down. `spin` is the wheels' angular
-    momentum (N m s). With d a joint's slope, r the wheel's place, q = (d, r x d), A the wheel's acceleration and G = F -
-    m_u A' without the part of A that is unknown, d'Alembert's principle along the joint takes the travel out:
+    `force` (N) and `moment` (N m) act on the body at its centre of gravity, `on_wheels` (N) on the wheels' centres, all including
+    gravity. `suspension` (N) acts along each joint and pushes the wheel down. `spin` is the wheels' angular momentum (N m s).
+    With d the slope of a joint, r the position of its wheel, q = (d, r x d), and G = F - m_u A', where A' is the known part of
+    the wheel's acceleration, d'Alembert's principle along the joint eliminates the travel zeta:
 
         |d|^2 m_u zeta'' = d . G - S - m_u d . (a + alpha x r)
 
-    and leaves for the body a symmetric system in (a, alpha), in which each wheel has the inertia of a point mass across its
+    For the body this leaves a symmetric system in (a, alpha), in which each wheel has the inertia of a point mass across its
     joint: m_u (J^T J - q q^T / |d|^2) with J = (1, -[r]x).
     """
     on_wheel = each_wheel(lambda joint, wheel, F: minus(F, times(joint.mass, wheel.bias)), joints, wheels, on_wheels)
@@ -66,14 +67,14 @@ def accelerations(
 
 @fence_results
 def _solve(matrix: list, b: list) -> tuple[Vector, Vector]:
-    """Accelerations a and alpha of the body."""
+    """The accelerations a and alpha of the body."""
     found = solve_scalars(matrix, b)
     return Vector(*found[:3]), Vector(*found[3:])
 
 
 @fence_results
 def _matrix(inertia: Inertia, joints: Wheels, wheels: Wheels, ways: Wheels) -> list:
-    """Rows up to the diagonal of the system in (a, alpha): all as one rigid body, less what the joints leave free."""
+    """The lower triangle of the system in (a, alpha): that of one rigid body less the inertia along the free joints."""
     m = each_wheel(lambda joint: joint.mass, joints)
     moment = each_wheel(lambda mass, wheel: times(mass, wheel.place), m, wheels)
     s = add(*moment)
@@ -98,7 +99,7 @@ def _matrix(inertia: Inertia, joints: Wheels, wheels: Wheels, ways: Wheels) -> l
 
 @fence_results
 def _right_side(inertia, joints, wheels, ways, omega, spin, force, moment, on_wheel, suspension) -> list:
-    """Forces and moments on all as one rigid body, less what the joints do not carry."""
+    """The forces and moments on one rigid body of all masses, less the part along the free joints."""
     I, w = inertia, omega
     turns = Vector(I.x * w.x - I.xz * w.z, I.y * w.y, I.z * w.z - I.xz * w.x)
     rest = minus(moment, cross(w, add(turns, spin)))

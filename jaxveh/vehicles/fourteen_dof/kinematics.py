@@ -1,4 +1,4 @@
-"""How the body lies and turns over the road: roll, pitch and yaw, and the axes fixed in the body."""
+"""Attitude and rotation of the body: roll, pitch and yaw, and the axes fixed in the body."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus,
 
 
 class Attitude(NamedTuple):
-    """The intermediate axes (x, y in the road's plane, z its normal, turned by the yaw), seen in the body's axes.
+    """The intermediate axes (x, y in the road's plane, z its normal, turned by the yaw), expressed in the body's axes.
 
     The body is turned from them by the pitch about y, then by the roll about its own x (yaw-pitch-roll of ISO 8855: pitch is
-    positive nose down, roll left side up).
+    positive nose down, roll is positive left side up).
     """
 
     forward: Vector
@@ -32,12 +32,12 @@ def attitude(roll: Any, pitch: Any) -> Attitude:
 
 
 def to_road(axes: Attitude, a: Vector) -> Vector:
-    """A vector of the body's axes, in the intermediate ones."""
+    """A vector given in the body's axes, expressed in the intermediate axes."""
     return Vector(dot(axes.forward, a), dot(axes.left, a), dot(axes.up, a))
 
 
 def to_body(axes: Attitude, a: Vector) -> Vector:
-    """A vector of the intermediate axes, in the body's."""
+    """A vector given in the intermediate axes, expressed in the body's axes."""
     return add(times(a.x, axes.forward), times(a.y, axes.left), times(a.z, axes.up))
 
 
@@ -48,9 +48,10 @@ def angular_velocity(axes: Attitude, roll_rate: Any, pitch_rate: Any, yaw_rate: 
 
 
 def angle_accelerations(axes: Attitude, x: Any, omega: Vector, alpha: Vector) -> tuple[Any, Any, Any]:
-    """Second derivatives of roll, pitch and yaw, rad/s^2, of a body with the angular acceleration `alpha` (body's axes).
+    """The second derivatives of roll, pitch and yaw, rad/s^2, of a body with the angular acceleration `alpha` (body's axes).
 
-    `left` turns with the yaw alone and `up` not at all, so that in the body's axes they move with what is left of `omega`.
+    `left` rotates only with the yaw and `up` not at all. In the body's axes they therefore rotate with the difference of that
+    rotation and `omega`.
     """
     moves_left = cross(minus(times(x.yaw_rate, axes.up), omega), axes.left)
     moves_up = cross(axes.up, omega)
@@ -61,8 +62,8 @@ def angle_accelerations(axes: Attitude, x: Any, omega: Vector, alpha: Vector) ->
 
 
 class Body(NamedTuple):
-    """How the body moves: attitude, height of its centre of gravity over the road (m), and in its own axes velocity of that
-    point (m/s) and angular velocity (rad/s)."""
+    """The motion of the body: its attitude, the height of its centre of gravity over the road (m), and in its own axes the
+    velocity of that point (m/s) and the angular velocity (rad/s)."""
 
     axes: Attitude
     height: Any
@@ -72,7 +73,7 @@ class Body(NamedTuple):
 
 @numerics.fence_results
 def body_of(x: Any) -> Body:
-    """The body's motion out of the car's state."""
+    """The motion of the body from the state of the car."""
     axes = attitude(x.roll, x.pitch)
     velocity = to_body(axes, Vector(x.v_x, x.v_y, x.v_z))
     return Body(axes, x.z, velocity, angular_velocity(axes, x.roll_rate, x.pitch_rate, x.yaw_rate))

@@ -1,4 +1,4 @@
-"""Parameters of the car of fourteen degrees of freedom."""
+"""The parameters of the car with fourteen degrees of freedom."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from jaxveh.vehicles.two_track import AbstractTwoTrack
 
 
 class AbstractSuspendedTwoTrack(AbstractDriven, AbstractTwoTrack):
-    """A two-track car whose wheels have masses of their own on suspensions.
+    """A two-track car with suspensions, whose wheels have masses of their own.
 
-    **Parameters** of body and suspensions: `sprung_mass`, `unsprung_mass_front`, `unsprung_mass_rear` (kg; the latter each
-    wheel's); `roll_inertia`, `pitch_inertia`, `yaw_inertia`, `roll_yaw_product` (the integral of x z dm; kg m^2, of the sprung
-    mass about its centre of gravity, from which axles and `cg_height` are measured, too: at rest); `spring_`, `damper_`,
-    `anti_roll_` `front` and `rear` (N/m, N s/m at the wheel; N per m of difference of the wheels' travels); `roll_centre_` (m
-    over the road), `pitch_slope_` (-); `tyre_stiffness` (N/m), `tyre_damping` (N s/m); `wheel_inertia` (kg m^2, about the
-    axle; about other axes it belongs to the body); `toe_` (rad, inwards), `camber_` (rad, tops outwards), `ackermann` (-: 0
-    both front wheels turn alike, 1 about one point). `wheel_radius` is that without load.
+    **Parameters** of body and suspensions: `sprung_mass` (kg), `unsprung_mass_front`, `unsprung_mass_rear` (kg, per wheel);
+    `roll_inertia`, `pitch_inertia`, `yaw_inertia` (kg m^2, of the sprung mass about its centre of gravity), `roll_yaw_product`
+    (kg m^2, the integral of x z dm). The distances of the axles and `cg_height` are also those of the sprung mass, at rest.
+    `spring_`, `damper_`, `anti_roll_` `front` and `rear` (N/m, N s/m at the wheel; N per m of difference of the wheels'
+    travels); `roll_centre_` (m over the road), `pitch_slope_` (-); `tyre_stiffness` (N/m), `tyre_damping` (N s/m);
+    `wheel_inertia` (kg m^2, about the axle; that about other axes belongs to the body); `toe_` (rad, inwards), `camber_` (rad,
+    tops outwards), `ackermann` (-; 0: both front wheels have the same angle, 1: their axes meet in one point on the line of the
+    rear axle). `wheel_radius` is the unloaded radius.
     """
 
     _: KW_ONLY

@@ -1,4 +1,4 @@
-"""What the car of fourteen degrees of freedom says of itself beyond what all two-track cars say."""
+"""The outputs of the car with fourteen degrees of freedom in addition to those of all two-track cars."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ UNITS = {
     **dict.fromkeys((*wheel_names("M_x"), *wheel_names("M_y")), "N m"),
     **dict.fromkeys(("tyre_dissipation", "damper_dissipation", "brake_dissipation", "drag_dissipation"), "W"),
 }
-"""Units of states, inputs and outputs."""
+"""The units of states, inputs and outputs."""
 
 
 def by_wheel(**values: Wheels) -> dict:
-    """Outputs `<name>_fl` ... of each wheel's values."""
+    """The outputs `<name>_fl` ... with the values of each wheel."""
     return {name: v for prefix, wheels in values.items() for name, v in zip(wheel_names(prefix), wheels, strict=True)}
 
 
 def moments(forces: Wheels) -> dict:
-    """Overturning and rolling resistance moments of the tyres."""
+    """The overturning and rolling resistance moments of the tyres."""
     pick = lambda name: Wheels(*[getattr(f, name) for f in forces])
     return by_wheel(M_x=pick("M_x"), M_y=pick("M_y"))
 
 
 def attitude_outputs(x: Any, roll_acceleration: Any, pitch_acceleration: Any, a_z: Any) -> dict:
-    """Heave, roll and pitch."""
+    """The outputs of heave, roll and pitch."""
     kept = ("z", "v_z", "roll", "pitch", "roll_rate", "pitch_rate")
     own = {"roll_acceleration": roll_acceleration, "pitch_acceleration": pitch_acceleration, "a_z": a_z}
     return {name: getattr(x, name) for name in kept} | own

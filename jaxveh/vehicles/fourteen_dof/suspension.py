@@ -1,4 +1,4 @@
-"""The joints on which the wheels travel, and the springs, dampers and anti-roll bars along them."""
+"""The joints along which the wheels travel, with their springs, dampers and anti-roll bars."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ LEFT = Wheels(1.0, -1.0, 1.0, -1.0)
 
 
 class Joint(NamedTuple):
-    """A prismatic joint, in the body's axes from its centre of gravity: the wheel's centre at rest `place` (m), the way
-    it goes per metre of travel `slope`, its square; and the mass that it carries (kg)."""
+    """A prismatic joint in the body's axes: the wheel's centre at rest relative to the body's centre of gravity `place` (m), its
+    displacement per metre of travel `slope`, the square of that, and the mass of the wheel (kg)."""
 
     place: Vector
     slope: Vector
@@ -26,8 +26,8 @@ class Joint(NamedTuple):
 
 
 class Wheel(NamedTuple):
-    """A wheel's centre in the body's axes: place (m), velocity (m/s), and acceleration (m/s^2) as far as no acceleration of
-    the body or along the joint makes it (centripetal and Coriolis)."""
+    """The centre of a wheel in the body's axes: position (m), velocity (m/s), and the part of its acceleration (m/s^2) that does
+    not depend on accelerations of the body or the travel (centripetal and Coriolis)."""
 
     place: Vector
     velocity: Vector
@@ -35,13 +35,13 @@ class Wheel(NamedTuple):
 
 
 def spring_loads(car: AbstractSuspendedTwoTrack) -> Wheels:
-    """What each spring carries at rest, N."""
+    """The load of each spring at rest, N."""
     half = 0.5 * GRAVITY * car.sprung_mass / (car.front_axle_to_cg + car.rear_axle_to_cg)
     return front_rear(half * car.rear_axle_to_cg, half * car.front_axle_to_cg)
 
 
 def unsprung(car: AbstractSuspendedTwoTrack) -> Wheels:
-    """The mass that each wheel carries with it, kg."""
+    """The unsprung mass of each wheel, kg."""
     return front_rear(car.unsprung_mass_front, car.unsprung_mass_rear)
 
 
@@ -51,7 +51,7 @@ def static_loads(car: AbstractSuspendedTwoTrack) -> Wheels:
 
 
 def sunk_at_rest(car: AbstractSuspendedTwoTrack) -> Wheels:
-    """By how much each tyre is compressed at rest, m, in the plane of its wheel, which camber inclines."""
+    """The compression of each tyre at rest, m, in the plane of its wheel, which is inclined by the camber."""
     return each_wheel(lambda load, lean: load * lean / car.tyre_stiffness, static_loads(car), leans(car))
 
 
@@ -63,8 +63,8 @@ def leans(car: AbstractSuspendedTwoTrack) -> Wheels:
 def joints(car: AbstractSuspendedTwoTrack) -> Wheels:
     """The joint of each wheel.
 
-    Across the car it is inclined so that the contact point turns about the roll centre: the left wheel moves outwards in
-    bump by `2 h_rc / track`. Along, by `pitch_slope`.
+    Across the car it is inclined so that the contact point turns about the roll centre: in bump the left wheel moves outwards by
+    `2 h_rc / track` per metre of travel. Along the car it is inclined by `pitch_slope`.
     """
     centres = front_rear(car.roll_centre_front, car.roll_centre_rear)
     tracks = front_rear(car.track_front, car.track_rear)
@@ -80,7 +80,7 @@ def joints(car: AbstractSuspendedTwoTrack) -> Wheels:
 
 
 def wheel_at(joint: Joint, travel: Any, rate: Any, body: Body) -> Wheel:
-    """The wheel's centre at a travel (m, up is positive) and its rate (m/s)."""
+    """The wheel's centre at a `travel` (m, positive upwards) and its `rate` (m/s)."""
     place = add(joint.place, times(travel, joint.slope))
     along = times(rate, joint.slope)
     carried = cross(body.omega, place)
@@ -89,9 +89,10 @@ def wheel_at(joint: Joint, travel: Any, rate: Any, body: Body) -> Wheel:
 
 
 def suspension_forces(car: AbstractSuspendedTwoTrack, travels: Wheels, rates: Wheels) -> tuple[Wheels, Wheels]:
-    """Force that pushes each wheel down against its travel (N), and the part of it that the damper makes.
+    """The force that pushes each wheel down against its travel (N), and the damper's part of it.
 
-    Spring, preloaded for rest, damper, and the anti-roll bar on the difference of an axle's travels.
+    It is the sum of the spring, preloaded for rest, the damper, and the anti-roll bar, which acts on the difference of the two
+    travels of an axle.
     """
     springs, dampers = front_rear(car.spring_front, car.spring_rear), front_rear(car.damper_front, car.damper_rear)
     bars = front_rear(car.anti_roll_front, car.anti_roll_rear)

@@ -1,4 +1,4 @@
-"""Where a wheel touches the road, how it slides there, and what the road's forces are to the body and to the wheel's spin."""
+"""The contact point of a wheel, its sliding, and the effect of the road's forces on the body and on the wheel's spin."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from jaxveh.vehicles.steering import about_one_point
 from jaxveh.vehicles.wheels import WheelMotion, Wheels, contact, each_wheel, front_rear, travel_direction
 
 ROLLING_SHARE = 1.0 / 3.0
-"""Of a tyre's compression the part by which its effective rolling radius shrinks: a belt that hardly stretches."""
+"""The decrease of a tyre's effective rolling radius over its compression: the belt hardly stretches."""
 
 
 def axles(car: AbstractSuspendedTwoTrack, steers: Wheels) -> Wheels:
-    """The axis about which each wheel spins, pointing to the left, in the body's axes.
+    """The spin axis of each wheel, pointing to the left, in the body's axes.
 
-    The wheels turn about the body's z axis by `steers` (rad), and the front ones as far as `ackermann` says by the angle with
-    which all wheels would turn about one point on the rear axle's line. Toe is positive inwards, camber where the tops lean out.
+    The wheels are turned about the body's z axis by `steers` (rad). The parameter `ackermann` changes the angles of the front
+    wheels towards those with which all axes meet in one point on the line of the rear axle. Toe is positive inwards, camber is
+    positive with the tops outwards.
     """
     length, half = car.front_axle_to_cg + car.rear_axle_to_cg, 0.5 * car.track_front
 
@@ -42,11 +43,11 @@ def axles(car: AbstractSuspendedTwoTrack, steers: Wheels) -> Wheels:
 
 
 class Touch(NamedTuple):
-    """How a wheel stands on the road. Vectors are in the intermediate axes.
+    """The contact of a wheel with the road in detail. Vectors are in the intermediate axes.
 
-    `arm` from its centre to the contact point, `radius` with which it rolls (m), `axis` of its spin, `turns`: the body's
-    angular velocity, `moves` (as `wheels.rolling`), and what makes the load: `sinks`, the contact point's speed into the
-    road (m/s), and `damped`, the damping's part of the load (N).
+    `arm`: from the wheel's centre to the contact point (m); `radius`: the rolling radius (m); `axis`: the spin axis; `turns`:
+    the body's angular velocity; `moves`: the motion as of `wheels.rolling`; `sinks`: the speed of the contact point into the
+    road (m/s); `damped`: the load less that of the tyre's spring (N).
     """
 
     arm: Vector
@@ -64,8 +65,8 @@ def touch(
     """The contact of a wheel that spins with `omega` (rad/s) about `axis` (body's axes), where the road is `road` m high.
 
     The contact point lies below the centre in the wheel's plane (ISO 8855; H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed.,
-    sec. 2.2), its speed is that of the wheel's material there. The tyre is compressed along the wheel's plane, so that the
-    load, along the road's normal, is by 1 / cos(camber) larger: the potential of the compression then makes it.
+    sec. 2.2). Its speed is that of the wheel without its own spin. The tyre is compressed along the wheel's plane; the load,
+    along the road's normal, is larger by 1 / cos(camber), so that it derives from the potential of the compression.
     """
     height = body.height + dot(body.axes.up, wheel.place) - road
     speed, turns, axis = (to_road(body.axes, a) for a in (wheel.velocity, body.omega, axis))
@@ -73,7 +74,7 @@ def touch(
     cosine, sine = axis.y / flat, -axis.x / flat
     aside = height * axis.z / flat
     arm = Vector(-sine * aside, cosine * aside, -height)
-    # The wheel does not turn with the body about its own axis.
+    # The wheel does not turn with the body about its own spin axis.
     held = minus(turns, times(dot(turns, axis), axis))
     at = add(speed, cross(held, arm))
     compression = jnp.maximum(car.wheel_radius - height / flat, 0.0)
@@ -88,8 +89,8 @@ def touch(
 
 
 class Reaction(NamedTuple):
-    """What the road does through one wheel: force on its centre (N), moment on the body about that (N m; both in the body's
-    axes), moment on the wheel about its axis (N m), and the power that it takes from the car (W)."""
+    """The effect of the road through one wheel: the force on its centre (N) and the moment on the body about its centre (N m),
+    both in the body's axes, the moment on the wheel about its axis (N m), and the power taken from the car (W)."""
 
     force: Vector
     moment: Vector
@@ -103,13 +104,13 @@ def reaction(
 ) -> Reaction:
     """The road's forces on body and wheel.
 
-    The longitudinal force turns the wheel with the arm of the *rolling* radius. With the loaded radius, which is smaller,
-    a driven tyre would give more power to the car (F_x r_e omega) than it takes from the shaft (F_x r_l omega). The
-    difference, F_x (r_e - r_l), is a moment of the road: the load's centre moves forward under a driving force.
+    The longitudinal force acts on the wheel's spin with the arm of the *rolling* radius. With the loaded radius, which is
+    smaller, a driven tyre would give more power to the car (F_x r_e omega) than it takes from the shaft (F_x r_l omega). The
+    difference F_x (r_e - r_l) is a moment of the road: the centre of the load moves forward under a driving force.
     """
     moves, axis = how.moves, how.axis
     c, s = moves.cosine, moves.sine
-    # Tyres know no direction of travel: their rolling resistance is that of rolling forwards.
+    # The rolling resistance of a tyre law is that of forward travel; its sign is set here.
     rolling_moment = forces.M_y * travel_direction(moves.along)
     push = Vector(forces.F_x * c - forces.F_y * s, forces.F_x * s + forces.F_y * c, at.load)
     own = Vector(forces.M_x * c - rolling_moment * s, forces.M_x * s + rolling_moment * c, forces.M_z)

@@ -1,4 +1,4 @@
-"""Vectors of three named scalars: a batch has arrays in the fields, and no axis of length three."""
+"""Vectors of three named scalars: in a batch the fields are arrays, without an axis of length three."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 
 class Vector(NamedTuple):
-    """Components along x, y and z of whatever axes it is said to be in."""
+    """The components of a vector along x, y and z."""
 
     x: Any
     y: Any
@@ -14,7 +14,7 @@ class Vector(NamedTuple):
 
 
 def add(first: Vector, *others: Vector) -> Vector:
-    """The sum."""
+    """The sum of vectors."""
     for other in others:
         first = Vector(first.x + other.x, first.y + other.y, first.z + other.z)
     return first
@@ -26,15 +26,15 @@ def minus(a: Vector, b: Vector) -> Vector:
 
 
 def times(factor: Any, a: Vector) -> Vector:
-    """`factor` times a."""
+    """`factor` times `a`."""
     return Vector(factor * a.x, factor * a.y, factor * a.z)
 
 
 def dot(a: Vector, b: Vector) -> Any:
-    """The inner product."""
+    """The inner product of two vectors."""
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """a x b, in axes that are right-handed."""
+    """The cross product a x b in right-handed axes."""
     return Vector(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)

@@ -1,6 +1,6 @@
-"""Cars as numbers: records with their sources, from which vehicles of every fidelity are built.
+"""The numbers of cars: records with their sources, from which vehicles of every fidelity are built.
 
-`build(sets.compact_car(), SevenDOF)` is a car; the records are functions, so that nothing is made on import.
+`build(sets.compact_car(), SevenDOF)` is a car. The records are returned by functions, so that importing creates nothing.
 """
 
 from jaxveh.vehicles.sets.build import build

@@ -1,4 +1,4 @@
-"""From a car's numbers to a vehicle of any fidelity."""
+"""Vehicles of any fidelity from the numbers of a car."""
 
 from __future__ import annotations
 
@@ -13,21 +13,22 @@ from jaxveh.vehicles.sets.numbers import CarNumbers
 from jaxveh.vehicles.sets.tyres import axle_tyre, wheel_tyre
 
 SWITCHES = ("cg_height",)
-"""Numbers that switch something on in classes where they may be left out."""
+"""Numbers that switch on a part of the model in classes where they are optional."""
 
 V = TypeVar("V", bound=AbstractVehicle)
 
 
 def build(numbers: CarNumbers, kind: type[V], **options: Any) -> V:
-    """The vehicle of class `kind`, such as `SevenDOF`, with a car's numbers.
+    """The vehicle of class `kind`, such as `SevenDOF`, with the numbers of a car.
 
-    Each parameter of the class gets the number of its name. Axles of a car with tracks get `wheel_tyre`s, those of one track
-    `axle_tyre`s, `drive` is an `AxleDrive` of the car's shares or `FourMotors`. A class that has no `mass` of its own has a
-    sprung one, and gets the sprung mass' place and inertias. What a number would switch on (load transfer of a `SingleTrack` by
-    `cg_height`) stays off. `options` are parameters to set otherwise, such as `front=tyre` or
-    `cg_height=numbers.cg_height`.
+    Each parameter of the class gets the number with its name. The tyres are a `wheel_tyre` per axle for cars with tracks and an
+    `axle_tyre` for cars on one track; `drive` is an `AxleDrive` with the car's shares, or `FourMotors`. A class without a
+    parameter `mass` has a sprung mass, and gets the position and inertias of that. Parts of a model that a number would switch
+    on (load transfer of a `SingleTrack` by `cg_height`) stay off. `options` are parameters to set differently, such as
+    `front=tyre` or `cg_height=numbers.cg_height`.
 
-    **Raises** `InputError` naming what the class needs and the car's numbers do not hold, and for options it does not have.
+    **Raises** `InputError` with the parameters of the class that are missing from the numbers, and for options that are not
+    parameters of the class.
     """
     entries = {entry.name: entry for entry in fields(kind)}
     check_names(f"build({numbers.name}, {kind.__name__})", options, entries)
@@ -42,7 +43,7 @@ def build(numbers: CarNumbers, kind: type[V], **options: Any) -> V:
     given |= _tyres(numbers, entries, options) | _drive(numbers, entries, options) | options
     missing = [name for name, entry in entries.items() if _is_required(entry) and name not in given]
     if missing:
-        raise InputError(f"{numbers.name}: {kind.__name__} needs {', '.join(missing)}, which its numbers do not hold.")
+        raise InputError(f"{numbers.name}: {kind.__name__} needs {', '.join(missing)}, missing from its numbers.")
     return kind(**given)
 
 

@@ -1,6 +1,7 @@
-"""The vehicles that come with CommonRoad: measured cars that many papers use.
+"""The vehicles of CommonRoad: measured cars that many papers use.
 
-Their tyres are as stiff over load in front as behind, so that all the cars are neutral: their understeer gradient is zero.
+Their tyres have the same stiffness over load in front and at the rear, so that all the cars are neutral: the understeer
+gradient is zero.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ TYRE = {
     "r_by1": 7.1433, "r_by2": 9.1916, "r_by3": -0.027856, "r_cy1": 1.0719, "r_ey1": -0.27572, "r_hy1": 5.7448e-6,
     "r_vy1": -0.027825, "r_vy3": -0.27568, "r_vy4": 12.12, "r_vy5": 1.9, "r_vy6": -10.704,
 }  # fmt: skip
-"""CommonRoad's tyre for all its cars, PAC2002 from the handbook of ADAMS (the same paper, table 7)."""
+"""The tyre of all CommonRoad cars, PAC2002 from the handbook of ADAMS (the same paper, table 7)."""
 
 COMMON: dict[str, Any] = {
     "steer_rate_min": -0.4, "steer_rate_max": 0.4, "acceleration_max": 11.5, "wheel_inertia": 1.7, "wheel_radius": 0.344,
@@ -69,7 +70,7 @@ def vw_vanagon() -> CommonRoadSpecification:
 
 
 def semi_trailer_truck() -> CommonRoadSpecification:
-    """Vehicle 4, a tractor with a semi-trailer on its rear axle: lengths and limits alone."""
+    """Vehicle 4, a tractor with a semi-trailer on its rear axle: only lengths and limits."""
     return CommonRoadSpecification(
         length=5.1, width=2.55, steer_min=-0.55, steer_max=0.55, steer_rate_min=-0.7103, steer_rate_max=0.7103,
         speed_min=-2.78, speed_max=22.22, switching_speed=7.824, acceleration_max=11.5, front_axle_to_cg=1.8,
@@ -94,6 +95,6 @@ def van() -> CarNumbers:
 
 
 def semi_trailer() -> CarNumbers:
-    """A tractor with a semi-trailer, CommonRoad's vehicle 4: lengths alone, for kinematic cars."""
+    """A tractor with a semi-trailer, CommonRoad's vehicle 4: only lengths, for kinematic cars."""
     source = "CommonRoad vehicle 4 (semi-trailer truck): M. Althoff & G. Würsching, CommonRoad: Vehicle Models, 2020"
     return from_commonroad(semi_trailer_truck(), "semi_trailer", source)

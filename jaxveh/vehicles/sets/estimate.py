@@ -1,4 +1,4 @@
-"""A suspension where nobody has measured one."""
+"""An estimated suspension for cars without a measured one."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.sets.numbers import SuspensionNumbers
 
 RIDE_FRONT, RIDE_REAR = 1.3, 1.5
-"""Hz: natural frequencies of the body on its springs."""
+"""Hz: the natural frequencies of the body on its front and rear springs."""
 DAMPING = 0.27
-"""Damping ratio of the body on its springs."""
+"""The damping ratio of the body on its springs."""
 ROLL_RADIUS = 0.34
-"""Radius of gyration of the sprung mass in roll over the mean track."""
+"""The radius of gyration of the sprung mass in roll over the mean track."""
 PITCH_OVER_YAW = 1.04
-"""Pitch inertia of the sprung mass over its yaw inertia."""
+"""The pitch inertia of the sprung mass over its yaw inertia."""
 TYRE_STIFFNESS = 50.0
-"""1/m: vertical stiffness of a tyre over its load at rest."""
+"""1/m: the vertical stiffness of a tyre over its load at rest."""
 
 
 def estimated_suspension(
@@ -32,17 +32,18 @@ def estimated_suspension(
     unsprung_mass_front: float,
     unsprung_mass_rear: float,
 ) -> SuspensionNumbers:
-    """An ordinary car's suspension under a car whose other numbers are known: **an estimate of our own**.
+    """The suspension of an ordinary car for a car whose other numbers are known: **our own estimate**.
 
-    Frequencies, damping ratio, roll and pitch inertia and the tyre's stiffness are about those of the cars that were measured for
-    CommonRoad (`commonroad_cars`); anti-roll bars have 0.2 and 0.05 of the springs' stiffness, roll centres lie 0.05 m and 0.1 m
-    high. The sprung mass' place and yaw inertia follow from the car's, with the unsprung masses as points in the wheels' centres.
+    Frequencies, damping ratio, roll and pitch inertia and the tyre's stiffness are about those of the measured cars of CommonRoad
+    (`commonroad_cars`). Anti-roll bars have 0.2 and 0.05 of the springs' stiffness, and roll centres are 0.05 m and 0.1 m high.
+    The position and the yaw inertia of the sprung mass follow from those of the car, with the unsprung masses as point masses in
+    the wheels' centres. All arguments have the names and units of `CarNumbers` and `SuspensionNumbers`.
     """
     a, b = front_axle_to_cg, rear_axle_to_cg
     length, front, rear = a + b, 2.0 * unsprung_mass_front, 2.0 * unsprung_mass_rear
     sprung = mass - front - rear
     a_s = (mass * a - rear * length) / sprung
-    # Masses about the whole car's centre of gravity.
+    # The yaw inertia of all masses as points about the whole car's centre of gravity.
     turning = front * (a**2 + 0.25 * track_front**2) + rear * (b**2 + 0.25 * track_rear**2) + sprung * (a - a_s) ** 2
     k_front = (2.0 * math.pi * RIDE_FRONT) ** 2 * 0.5 * sprung * (length - a_s) / length
     k_rear = (2.0 * math.pi * RIDE_REAR) ** 2 * 0.5 * sprung * a_s / length

@@ -1,4 +1,4 @@
-"""A car's numbers out of CommonRoad's."""
+"""The numbers of a car from a CommonRoad specification."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from jaxveh.vehicles.sets.numbers import CarNumbers, SuspensionNumbers, TyreNumb
 def from_commonroad(specification: Any, name: str = "CommonRoad vehicle", source: str = "CommonRoad") -> CarNumbers:
     """The numbers of a `jaxveh.io.CommonRoadSpecification`, for `build`.
 
-    As in CommonRoad's own single-track models the distances of the axles from the sprung mass' centre of gravity are taken for
-    the whole car's. Tyres have the cornering stiffness `-p_ky1 F_z`, the slip stiffness `p_kx1 F_z` and the friction `p_dy1`.
-    Unsprung masses are halved, an anti-roll bar's stiffness at the wheels is `-K_ts / T^2`, and the sprung mass' yaw inertia is
-    the car's less that of its wheels and axles as points at the wheels. Where masses are missing (a tractor with a trailer) only
-    kinematic cars can be built.
+    As in CommonRoad's own single-track models, the distances of the axles from the centre of gravity of the sprung mass are used
+    for the whole car. Tyres have the cornering stiffness `-p_ky1 F_z`, the slip stiffness `p_kx1 F_z` and the friction `p_dy1`.
+    Unsprung masses are halved, and the stiffness of an anti-roll bar at the wheels is `-K_ts / T^2`. The yaw inertia of the
+    sprung mass is that of the car less that of wheels and axles as point masses at the wheels. If masses are missing (a tractor
+    with a trailer), only kinematic cars can be built.
     """
     s = specification
     weight = None if s.mass is None else 0.5 * s.mass * GRAVITY / (s.front_axle_to_cg + s.rear_axle_to_cg)
@@ -40,7 +40,7 @@ def from_commonroad(specification: Any, name: str = "CommonRoad vehicle", source
 def commonroad_limits(specification: Any) -> tuple[SteerLimits, AccelerationLimits]:
     """The limits of steering and acceleration of a `jaxveh.io.CommonRoadSpecification`, for `Commanded`.
 
-    **Raises** `InputError` naming what the specification does not hold.
+    **Raises** `InputError` with the limits that are missing from the specification.
     """
     steering = ("steer_min", "steer_max", "steer_rate_min", "steer_rate_max")
     driving = ("acceleration_max", "switching_speed", "speed_min", "speed_max")

@@ -8,10 +8,11 @@ from jaxveh.vehicles.sets.numbers import CarNumbers, SuspensionNumbers, TyreNumb
 def suv() -> CarNumbers:
     """A heavy off-road car, 2570 kg, after Project Chrono's SUV (`Nissan_Patrol`; projectchrono.org).
 
-    Theirs: the chassis' mass, inertias and place, the wheelbase, the masses of spindles, uprights, arms, rims and tyres (half of
-    an arm is sprung), where the wheels stand (wider than the road car's), the tyre's radius, vertical stiffness and damping, and
-    its TMeasy slopes and peak at these loads. The whole car's mass, inertia and centre of gravity follow. **Our own estimate**:
-    springs (a ride of 1.3 and 1.5 Hz), dampers, bars, roll centres, air, rolling resistance, shares of drive and brakes.
+    From Chrono: mass, inertias and position of the chassis, the wheelbase, the masses of spindles, uprights, arms, rims and tyres
+    (half of an arm is sprung), the positions of the wheels (wider than on the road car), the tyre's radius, vertical stiffness
+    and damping, and its TMeasy slopes and peak at these loads. Mass, inertia and centre of gravity of the whole car follow from
+    these. **Our own estimate**: springs (ride frequencies of 1.3 and 1.5 Hz), dampers, bars, roll centres, air, rolling
+    resistance, shares of drive and brakes.
     """
     return CarNumbers(
         name="suv",
@@ -45,11 +46,12 @@ def suv() -> CarNumbers:
 def truck() -> CarNumbers:
     """A two-axle truck, 9480 kg, after Project Chrono's MAN 5t (Kat 1; projectchrono.org).
 
-    Theirs: the chassis' mass, inertias and place, the wheelbase, the rear axle's masses and springs (taken for the front axle
-    too, linearised at rest), its dampers (the secant at 0.3 m/s, mean of both directions), track, and masses and inertias of tyre
-    and rim. The whole truck's mass, inertia and centre of gravity follow. A rigid axle rolls on springs 0.62 m from the middle:
-    the wheel's springs are those of heave, and too stiff in roll. **Our own estimate**: the tyre's stiffnesses and friction
-    (truck tyres: about 5 a rad), roll centres, air, rolling resistance, shares of brakes.
+    From Chrono: mass, inertias and position of the chassis, the wheelbase, the masses and springs of the rear axle (used for the
+    front axle too, linearised at rest), its dampers (the secant at 0.3 m/s, mean of both directions), track, and masses and
+    inertias of tyre and rim. Mass, inertia and centre of gravity of the whole truck follow from these. The rigid axle has its
+    springs 0.62 m from the middle: the spring rates here, given at the wheel, are right for heave and too stiff for roll. **Our
+    own estimate**: the tyre's stiffnesses and friction (for truck tyres the cornering stiffness is about 5 times the load per
+    rad), roll centres, air, rolling resistance, shares of brakes.
     """
     return CarNumbers(
         name="truck",

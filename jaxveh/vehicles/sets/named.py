@@ -37,7 +37,7 @@ CARS: dict[str, Callable[[], CarNumbers]] = {
     "ferrari_250lm": race_cars.ferrari_250lm,
     "semi_trailer": commonroad_cars.semi_trailer,
 }
-"""Makers of the numbers of cars, by name."""
+"""Functions that return the numbers of cars, by name."""
 
 FIDELITIES: dict[str, type[AbstractVehicle]] = {
     "longitudinal": Longitudinal,
@@ -53,13 +53,14 @@ FIDELITIES: dict[str, type[AbstractVehicle]] = {
     "seven-dof": SevenDOF,
     "fourteen-dof": FourteenDOF,
 }
-"""Classes of vehicles, by name, the simplest first."""
+"""The classes of vehicles by name, the simplest first."""
 
 
 def named_car(name: str, fidelity: str = "single-track", **options: Any) -> AbstractVehicle:
     """The car `name` of `CARS` as the vehicle `fidelity` of `FIDELITIES`; `options` as in `build`.
 
-    **Raises** `InputError` for a name that is not there (with the near ones), and where the car's numbers do not reach.
+    **Raises** `InputError` for an unknown name (it lists similar ones), and if the vehicle needs numbers that the car does not
+    have.
     """
     kit.check_known("vehicles", "car", name, CARS)
     kit.check_known("vehicles", "fidelity", fidelity, FIDELITIES)
@@ -69,7 +70,7 @@ def named_car(name: str, fidelity: str = "single-track", **options: Any) -> Abst
 def specified_car(specification: Any, fidelity: str = "single-track") -> AbstractVehicle:
     """The car of a file (`jaxveh.io.CarSpecification`) as the vehicle `fidelity` of `FIDELITIES`.
 
-    **Raises** `InputError` for another fidelity, and where the file's numbers do not reach.
+    **Raises** `InputError` for an unknown fidelity, and if the vehicle needs numbers that are missing from the file.
     """
     kit.check_known("vehicles", "fidelity", fidelity, FIDELITIES)
     if fidelity == "single-track":

@@ -1,4 +1,4 @@
-"""What is known of a car, as plain numbers: one record from which vehicles of every fidelity are built."""
+"""The known numbers of a car: one record from which vehicles of every fidelity are built."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from jaxveh.vehicles.steering import AbstractSteering
 
 @dataclass(frozen=True)
 class TyreNumbers:
-    """One tyre, under its load at rest: `cornering_stiffness` (N/rad), `slip_stiffness` (N; None: as stiff as sideways), peak
-    `friction` (-). What is known better wins, in this order: `property_file`, the path of a tyre property file; `coefficients` of
-    PAC2002 by their names in property files, with stiffness proportional to load; `axle_formula`, the Magic Formula (B, C, D, E)
-    of both tyres of the axle together, for cars on one track alone."""
+    """One tyre under its load at rest: `cornering_stiffness` (N/rad), `slip_stiffness` (N; None: the cornering stiffness), peak
+    `friction` (-). More detailed data replace these, in this order: `property_file`, the path of a tyre property file;
+    `coefficients` of PAC2002 by their names in property files, with stiffness proportional to load; `axle_formula`, the Magic
+    Formula (B, C, D, E) of both tyres of the axle together, only for cars on one track."""
 
     cornering_stiffness: float
     slip_stiffness: float | None = None
@@ -33,8 +33,8 @@ class TyreNumbers:
 
 @dataclass(frozen=True)
 class SuspensionNumbers:
-    """What carries the body: masses (kg; unsprung ones of a wheel), the inertias of the sprung mass about its own centre of
-    gravity (kg m^2), where that lies (m: distances to the axles, height at rest), springs (N/m) and dampers (N s/m) as felt at a
+    """Body and suspension: masses (kg; unsprung ones per wheel), the inertias of the sprung mass about its own centre of gravity
+    (kg m^2) and the position of that (m: distances from the axles, height at rest), springs (N/m) and dampers (N s/m) at the
     wheel, anti-roll bars (N/m: force at a wheel over the difference of the two wheels' travels), heights of the roll centres
     (m), stiffness (N/m) and damping (N s/m) of a tyre."""
 
@@ -74,16 +74,16 @@ class SuspensionNumbers:
 
 @dataclass(frozen=True)
 class CarNumbers:
-    """A car's numbers in SI units, None where they are not known; `source` says where they are from.
+    """The numbers of a car in SI units, None if unknown; `source` is their origin.
 
     Distances of the axles from the centre of gravity of the whole car, `cg_height`, tracks and `wheel_radius` in m; `mass` kg,
     `yaw_inertia` kg m^2, `wheel_inertia` kg m^2 (of one wheel), `drag` N s^2/m^2, `rolling_resistance` (-), the front axle's
-    shares of driving and braking (-), `four_motors`: each wheel has its own; tyres of one wheel on the front and the rear axle;
-    `cg_height` stays out of cars for which it is an option (`build`). `trailer_length` (m): from the hitch to the trailer's axle.
-    `steer_offset` (rad) is added to the steer. `steering`: what turns which wheels (`AbstractSteering`), None for front
-    wheels alone.
+    shares of driving and braking (-), `four_motors`: whether each wheel has its own motor; `front` and `rear`: the tyre of one
+    wheel of each axle. Vehicles with an optional `cg_height` are built without it (see `build`). `trailer_length` (m): from the
+    hitch to the trailer's axle. `steer_offset` (rad) is added to the steer. `steering`: the steering system
+    (`AbstractSteering`), None for front steering.
 
-    **Raises** `InputError` for what no car has.
+    **Raises** `InputError` for values that no car has.
     """
 
     name: str
@@ -123,19 +123,19 @@ class CarNumbers:
 
     @property
     def wheelbase(self) -> float:
-        """Distance between the axles, m."""
+        """The distance between the axles, m."""
         return self.front_axle_to_cg + self.rear_axle_to_cg
 
     def wheel_loads(self) -> tuple[float, float]:
-        """Loads of a front and of a rear wheel at rest on a level road, N."""
+        """The loads of a front and of a rear wheel at rest on a level road, N."""
         if self.mass is None:
-            raise InputError(f"{self.name}: the mass is missing, from which the loads follow; give it in kg.")
+            raise InputError(f"{self.name}: the mass is missing, which the loads need; give it in kg.")
         half = 0.5 * self.mass * GRAVITY / self.wheelbase
         return half * self.rear_axle_to_cg, half * self.front_axle_to_cg
 
     def values(self, sprung: bool = False) -> dict[str, Any]:
-        """Every number that is known, by the name that vehicles use; where and how heavy to turn the sprung mass is instead of
-        the whole car's if `sprung`. Axle stiffnesses are twice a tyre's."""
+        """All known numbers by the names of the vehicles' parameters. With `sprung` the position and the inertias are those of
+        the sprung mass instead of the whole car. Axle stiffnesses are twice those of a tyre."""
         found = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         found |= {"wheelbase": self.wheelbase}
         for axle in ("front", "rear"):
@@ -151,9 +151,10 @@ class CarNumbers:
         return {name: value for name, value in found.items() if value is not None}
 
     def _leaning_parameters(self, s: SuspensionNumbers, known: dict[str, Any]) -> dict[str, Any]:
-        """What cars that do not ride on their springs need of them: `unsprung_height`, `roll_yaw_product` about the roll axis
-        below the whole car's centre of gravity, and the front axle's share of the lateral transfer (`front_roll_share`): of
-        springs and bars by stiffness, of roll centres and unsprung masses by what each axle carries."""
+        """The parameters of the suspension for cars without suspension travel: `unsprung_height`, `roll_yaw_product` about the
+        roll axis below the whole car's centre of gravity, and the front axle's share of the lateral load transfer
+        (`front_roll_share`). The part of springs and bars is shared by stiffness, that of roll centres and unsprung masses by
+        the masses on each axle."""
         found = {} if self.wheel_radius is None else {"unsprung_height": self.wheel_radius}
         share = self.rear_axle_to_cg / self.wheelbase
         axis = share * s.roll_centre_front + (1.0 - share) * s.roll_centre_rear
@@ -175,7 +176,7 @@ class CarNumbers:
         return found | {"front_roll_share": front / (leaning + sum(direct))}
 
     def _rolling(self, s: SuspensionNumbers) -> dict[str, Any]:
-        """Roll stiffness (N m/rad) and damping (N m s/rad) of each axle: springs and bar, with the tyres in series."""
+        """The roll stiffness (N m/rad) and damping (N m s/rad) of each axle: springs and bar, with the tyres in series."""
         found = {}
         for axle in ("front", "rear"):
             track = getattr(self, f"track_{axle}")
@@ -191,14 +192,14 @@ class CarNumbers:
 NAMED_ALIKE = (
     "mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg", "track_front", "track_rear", "wheel_radius", "wheel_inertia",
 )  # fmt: skip
-"""What cars' files and CommonRoad's call as `CarNumbers` does."""
+"""The numbers with the same names in cars' files, in CommonRoad's files and in `CarNumbers`."""
 
 SHARES = ("front_drive", "front_brake")
-"""What is generic where they do not say."""
+"""The numbers with a generic default for files without them."""
 
 
 def named_alike(specification: Any) -> dict[str, Any]:
-    """Numbers out of a file's specification that have the names of those of `CarNumbers`, without shares that it leaves out."""
+    """The numbers of a file's specification with the same names as in `CarNumbers`, without shares that are missing from it."""
     shares = {name: getattr(specification, name) for name in SHARES}
     known = {name: share for name, share in shares.items() if share is not None}
     return {name: getattr(specification, name) for name in NAMED_ALIKE} | known

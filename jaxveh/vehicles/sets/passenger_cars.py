@@ -1,4 +1,4 @@
-"""Passenger cars from papers, completed by estimates that say so."""
+"""Passenger cars from papers, completed by estimates that are marked as such."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from jaxveh.vehicles.sets.numbers import CarNumbers, TyreNumbers
 def passenger_car() -> CarNumbers:
     """The passenger car of Bao, Sabbioni et al. (2015) with its erratum corrected: `jaxveh.vehicles.passenger_car`.
 
-    Mass, yaw inertia, distances of the axles and their Magic Formulas are the paper's; a wheel's stiffness and friction follow
-    from the formulas. All else (height, tracks, wheels, air, rolling resistance, suspension) is **our own estimate** of an
-    ordinary front-driven car.
+    Mass, yaw inertia, distances of the axles and their Magic Formulas are those of the paper; the stiffness and friction of a
+    wheel follow from the formulas. All other numbers (height, tracks, wheels, air, rolling resistance, suspension) are **our own
+    estimate** of an ordinary car with front-wheel drive.
     """
     body: dict[str, Any] = {
         "mass": 1420.0, "yaw_inertia": 2124.0, "front_axle_to_cg": 0.96, "rear_axle_to_cg": 1.59,
@@ -35,7 +35,7 @@ def passenger_car() -> CarNumbers:
 def ev() -> CarNumbers:
     """An electric car with a motor in each wheel, for the estimators of Ji, Li & Fan (federated cubature Kalman filters).
 
-    The paper's table of the vehicle is lost: **all numbers are our own estimate** of a car of its kind.
+    The paper's table of the vehicle is lost: **all numbers are our own estimate** for a car of this kind.
     """
     body: dict[str, Any] = {
         "mass": 1230.0, "yaw_inertia": 1343.0, "front_axle_to_cg": 1.04, "rear_axle_to_cg": 1.56,

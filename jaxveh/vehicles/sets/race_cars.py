@@ -8,10 +8,11 @@ from jaxveh.vehicles.sets.numbers import CarNumbers, SuspensionNumbers, TyreNumb
 def race_car() -> CarNumbers:
     """An autonomous race car, 1300 kg, after the open simulator of TUM (TUMFTM/sim_vehicle_dynamics, `parameters`).
 
-    Theirs: mass, inertias, wheelbase, tracks, height, drag (its air lift is left out: cars here have none), springs and dampers
-    (taken for those at the wheel), anti-sway bars, shares of the brakes, and the tyre's Magic Formula at 3000 N (B C D = 53
-    kN/rad, peak 1.5 of the load), wheel radius and inertia. **Our own estimate**: unsprung masses (30 kg a wheel) and what
-    follows from them, the tyre's vertical stiffness, roll centres, rolling resistance.
+    From the simulator: mass, inertias, wheelbase, tracks, height, drag (its aerodynamic lift is left out, because the vehicles
+    here have none), springs and dampers (used as those at the wheel), anti-sway bars, shares of the brakes, the tyre's Magic
+    Formula at 3000 N (B C D = 53 kN/rad, peak 1.5 times the load), wheel radius and inertia. **Our own estimate**: unsprung
+    masses (30 kg per wheel) and the numbers that follow from them, the tyre's vertical stiffness, roll centres, rolling
+    resistance.
     """
     return CarNumbers(
         name="race_car",
@@ -43,9 +44,9 @@ def race_car() -> CarNumbers:
 
 
 def ferrari_250lm() -> CarNumbers:
-    """The 1966 Ferrari 250 LM of the Revs Program (Stanford University, hd122pw0365), as MBDS/sideslip-angle-vehicle-estimation
-    (doi:10.3390/s21165409) states it: mass, yaw inertia, axles and their cornering stiffnesses. Friction 1.1 is what its rear
-    axle reaches in the recording. The rest is not known: cars on one track can be built."""
+    """The 1966 Ferrari 250 LM of the Revs Program (Stanford University, hd122pw0365), with mass, yaw inertia, axles and their
+    cornering stiffnesses of MBDS/sideslip-angle-vehicle-estimation (doi:10.3390/s21165409). The friction of 1.1 is what its rear
+    axle reaches in the recording. All other numbers are unknown, so that only cars on one track can be built."""
     return CarNumbers(
         name="ferrari_250lm",
         source="MBDS/sideslip-angle-vehicle-estimation, doi:10.3390/s21165409; friction from its recording",

@@ -1,4 +1,4 @@
-"""A car's numbers out of the file that describes it, and what a file would say of numbers."""
+"""The numbers of a car from the file that describes it, and the file's content from the numbers."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from jaxveh.vehicles.steering import specification_of_steering, steering_of
 
 
 def numbers_of(specification: Any) -> CarNumbers:
-    """The numbers of a `jaxveh.io.CarSpecification`, for `build`: cars on four wheels out of the file of a single track.
+    """The numbers of a `jaxveh.io.CarSpecification`, for `build`: cars on four wheels from the file of a single track.
 
-    A wheel's tyre is its property file's (`front_tyre`, `rear_tyre`) where there is one; else a typical one with half the axle's
-    cornering stiffness, and with the friction D over the axle's load where the axle's D is given, else 1. What the file
-    leaves out `build` asks for by name. `steer_offset` is what the steer channel shows when the car runs straight, so that the
-    car's own is the negative of it.
+    The tyre of a wheel is that of its property file (`front_tyre`, `rear_tyre`) if there is one. Otherwise it is a typical one
+    with half the axle's cornering stiffness; its friction is the axle's D over its load if D is given, otherwise 1. If the file
+    lacks a number that a vehicle needs, the error of `build` names it. The `steer_offset` of the file is the value of the steer
+    channel when the car runs straight; that of the car has the opposite sign.
 
-    **Raises** `InputError` where an axle has neither coefficients nor cornering stiffness.
+    **Raises** `InputError` for an axle with neither coefficients nor a cornering stiffness.
     """
     s = specification
     weight = s.mass * GRAVITY / (s.front_axle_to_cg + s.rear_axle_to_cg)
@@ -31,7 +31,7 @@ def numbers_of(specification: Any) -> CarNumbers:
         **named_alike(s),
         front=_tyre(s, "front", weight * s.rear_axle_to_cg),
         rear=_tyre(s, "rear", weight * s.front_axle_to_cg),
-        # A file may hold 0 for a car whose loads stay.
+        # A file may have 0 for a car with constant loads.
         cg_height=s.cg_height or None,
         drag=s.drag,
         rolling_resistance=s.rolling_resistance,
@@ -49,17 +49,16 @@ def _tyre(s: Any, axle: str, load: float) -> TyreNumbers:
 
 
 def specification_of(numbers: CarNumbers) -> CarSpecification:
-    """What a car's file would say of these numbers: the inverse of `numbers_of`, with each axle's tyres as a Magic Formula.
+    """The content of a car's file with these numbers: the inverse of `numbers_of`, with each axle's tyres as a Magic Formula.
 
-    A file knows of a suspension how the body leans (`leaning_numbers`), nothing of trailers, and of four motors no more than the
-    front axle's share.
+    Of a suspension a file has only the `leaning_numbers`, and of four motors only the front axle's share. It has no trailer.
 
-    **Raises** `InputError` for a car without mass, yaw inertia or tyres, which no file can leave out, or a steering that none can
-    say.
+    **Raises** `InputError` for a car without mass, yaw inertia or tyres, which every file needs, or a steering that no file can
+    describe.
     """
     missing = [name for name in ("mass", "yaw_inertia", "front", "rear") if getattr(numbers, name) is None]
     if missing:
-        raise InputError(f"{numbers.name}: {', '.join(missing)} must be known for a car's file, and is not.")
+        raise InputError(f"{numbers.name}: a car's file needs {', '.join(missing)}, missing from its numbers.")
     loads = {axle: 2.0 * load for axle, load in zip(("front", "rear"), numbers.wheel_loads(), strict=True)}
     tyres = {axle: axle_tyre(getattr(numbers, axle), load) for axle, load in loads.items()}
     optional = ("cg_height", "drag", "rolling_resistance")
@@ -74,12 +73,13 @@ def specification_of(numbers: CarNumbers) -> CarSpecification:
 
 
 def leaning_numbers(numbers: CarNumbers) -> dict[str, float]:
-    """How the body leans over the road: `roll_gradient`, `pitch_gradient` (rad per m/s^2), `roll_frequency` (Hz) and
-    `roll_damping` (-) of a small roll about the roll axis; nothing where the suspension or the tracks are not known.
+    """The lean of the body: `roll_gradient`, `pitch_gradient` (rad per m/s^2), and `roll_frequency` (Hz) and `roll_damping` (-)
+    of small roll about the roll axis; empty if the suspension or the tracks are unknown.
 
-    With roll stiffness K and damping C of both axles, the sprung mass m at h above the roll axis and its inertia J about it:
-    `m h / (K - m g h)`, `sqrt((K - m g h) / J) / 2 pi`, `C / (2 sqrt((K - m g h) J))`. Pitch: all of the longitudinal transfer of
-    the sprung mass goes through springs and tyres, as without anti-dive.
+    With roll stiffness K and damping C of both axles, the sprung mass m at h above the roll axis and its inertia J about it, the
+    roll gradient is `m h / (K - m g h)`, the frequency `sqrt((K - m g h) / J) / 2 pi` and the damping ratio
+    `C / (2 sqrt((K - m g h) J))`. For pitch the whole longitudinal load transfer of the sprung mass acts on springs and tyres, as
+    without anti-dive.
     """
     s, known = numbers.suspension, numbers.values()
     names = [f"roll_{what}_{axle}" for what in ("stiffness", "damping") for axle in ("front", "rear")]

@@ -1,4 +1,4 @@
-"""Tyres from a few numbers."""
+"""Tyre models from a few numbers."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from jaxveh.tyres import AbstractTyre, MagicFormula, MFTyre, from_property_file,
 from jaxveh.vehicles.sets.numbers import TyreNumbers
 
 STRAIGHT = 1e4
-"""Multiple of the nominal load at which stiffness would be greatest: up to any real load it is proportional to it."""
+"""The multiple of the nominal load at which stiffness is greatest: so large that stiffness is proportional to any real load."""
 
 SHIFTS = ("PHX1", "PVX1", "PHY1", "PVY1")
-"""What a tyre pulls when it rolls straight: left out of cars whose right tyres mirror the left."""
+"""The coefficients of a tyre's forces at zero slip; left out of cars whose right tyres are mirror images of the left ones."""
 
 
 def wheel_tyre(numbers: TyreNumbers, load: float, radius: float | None = None) -> AbstractTyre:
-    """The tyre of one wheel, for combined slip and any load: a typical MF-Tyre 6.1 with these stiffnesses and this friction at
-    the static `load` (N), unless the numbers name a property file or give coefficients (then an MF-Tyre 5.2, without shifts).
+    """The tyre of one wheel, for combined slip and any load.
 
-    `radius` (m) is that of the wheel, 0.32 unless known.
+    If the numbers name a property file, it is the tyre of that file; if they have coefficients, it is an MF-Tyre 5.2 without
+    shifts. Otherwise it is a typical MF-Tyre 6.1 with their stiffnesses and friction at the static `load` (N). `radius` (m) is
+    that of the wheel, by default 0.32.
     """
     radius = 0.32 if radius is None else radius
     if numbers.property_file is not None:
@@ -32,13 +33,13 @@ def wheel_tyre(numbers: TyreNumbers, load: float, radius: float | None = None) -
     along = numbers.cornering_stiffness if numbers.slip_stiffness is None else numbers.slip_stiffness
     scales = {
         "LKY": numbers.cornering_stiffness / (-kit.TYPICAL_COEFFICIENTS["PKY1"] * load),
-        # Camber's stiffness goes with the slip's, as that of one carcass: with the typical tyre's own, a softened front axle
-        # would have twice the rear's camber thrust, and a leaning car 8 % less yaw gain.
+        # The camber stiffness scales with the cornering stiffness, since both are of one carcass. With that of the typical tyre a
+        # softened front axle would have twice the camber thrust of the rear, and a rolling car 8 % less yaw gain.
         "LKYC": numbers.cornering_stiffness / (-kit.TYPICAL_COEFFICIENTS["PKY1"] * load),
         "LKX": along / (kit.TYPICAL_COEFFICIENTS["PKX1"] * load),
         "LMUX": numbers.friction / kit.TYPICAL_COEFFICIENTS["PDX1"],
         "LMUY": numbers.friction / kit.TYPICAL_COEFFICIENTS["PDY1"],
-        # The car's own number says how hard it rolls.
+        # Rolling resistance is a parameter of the car.
         "LMY": 0.0,
     }
     return eqx.tree_at(
@@ -47,8 +48,9 @@ def wheel_tyre(numbers: TyreNumbers, load: float, radius: float | None = None) -
 
 
 def axle_tyre(numbers: TyreNumbers, load: float) -> MagicFormula:
-    """Both tyres of an axle as one Magic Formula: its own where it is known; else of this stiffness and friction at the axle's
-    static `load` (N) and of ordinary shape (`tyres.kit.GENERIC_TYRE`), with force proportional to load."""
+    """Both tyres of an axle as one Magic Formula: the `axle_formula` of the numbers if there is one, otherwise one with their
+    stiffness and friction at the axle's static `load` (N) and the shape of an ordinary tyre (`tyres.kit.GENERIC_TYRE`), with
+    the force proportional to load."""
     if numbers.axle_formula is not None:
         return MagicFormula(*numbers.axle_formula)
     return kit.GENERIC_TYRE.magic_formula(2.0 * numbers.cornering_stiffness, load, numbers.friction)
