@@ -12,6 +12,7 @@ from pathlib import Path
 
 import jax
 import pytest
+from time_budget import keep_to_budget, record_seconds
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
@@ -25,7 +26,7 @@ QUICKLY_COMPILED = " ".join(
     )
 )
 
-QUICK_RUNS = ("not full", "peers", "studies")
+QUICK_RUNS = ("not full", "peers", "studies", "thorough")
 """How the expressions of `-m` begin whose runs are compiled quickly; the first is the default's (`addopts`)."""
 
 KEPT_AT_MOST = 2e9
@@ -74,6 +75,7 @@ def pytest_collection_modifyitems(items):
             place = order.setdefault((item.path, item.originalname), len(order)) + sum(item.callspec.indices.values())
             if place % COLOURS:
                 item.add_marker(pytest.mark.full)
+    keep_to_budget(items)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -90,6 +92,21 @@ def pytest_xdist_make_scheduler(config, log):
             return nodeid.replace(case, program_of(case)) if file.endswith("test_every_filter.py") else file
 
     return LoadPrograms(config, log) if config.getvalue("dist") == "loadfile" else None
+
+
+took: dict = {}
+
+
+def pytest_runtest_logreport(report):
+    """How long each test took; `JAXVEH_SECONDS=1` puts it on record."""
+    if report.when == "call" and report.passed:
+        took[report.nodeid] = report.duration
+
+
+def pytest_sessionfinish(session):
+    """Only the process that has all reports writes."""
+    if "JAXVEH_SECONDS" in os.environ and not hasattr(session.config, "workerinput"):
+        record_seconds(took)
 
 
 @pytest.hookimpl(trylast=True)

@@ -13,6 +13,7 @@ from jaxveh import numerics
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter_table import WithParameters
 from jaxveh.roads import LEVEL, Ground
+from jaxveh.vehicles.checked import with_checked_results
 
 GRAVITY = 9.80665
 """Standard acceleration of free fall, m/s^2."""
@@ -81,6 +82,8 @@ class AbstractVehicle(WithParameters, eqx.Module):
         super().__init_subclass__(**options)
         if not cls.__name__.startswith("Abstract"):
             cls.__doc__ = with_shared_parameters(cls)
+        if "evaluate" in vars(cls):
+            cls.evaluate = with_checked_results(cls.evaluate)
 
     @property
     @abc.abstractmethod

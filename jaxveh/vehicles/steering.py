@@ -195,11 +195,11 @@ def specification_of_steering(steering: AbstractSteering | None) -> dict[str, An
         raise InputError(f"{steering}: a car's file cannot describe this steering; it can have {', '.join(STEERINGS)}.")
     found: dict[str, Any] = {"steering": names[type(steering)]}
     if isinstance(steering, FourWheelSteering):
-        found["rear_steer_ratio"] = float(steering.rear_ratio)
+        found["rear_steer_ratio"] = plain_float(steering.rear_ratio)
         if steering.fast_ratio is not None:
             found |= {
-                "rear_steer_ratio_fast": float(steering.fast_ratio),
-                "rear_steer_speed": float(steering.middle_speed),
+                "rear_steer_ratio_fast": plain_float(steering.fast_ratio),
+                "rear_steer_speed": plain_float(steering.middle_speed),
             }
     return found
 

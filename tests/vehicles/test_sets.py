@@ -319,6 +319,15 @@ def test_a_file_would_say_the_same_of_a_car_on_one_track(name):
             np.testing.assert_allclose(*pair, rtol=1e-6)
 
 
+@pytest.mark.parametrize("name", WITH_MASS)
+def test_numbers_of_float32_are_written_with_the_digits_that_they_have(name, float32):
+    told = vehicles.specification_of(sets.CARS[name]())
+    for axle in (told.front, told.rear):
+        for part in (axle.B, axle.C, axle.D, axle.E):
+            assert len(repr(part)) <= 11 and np.float32(part) == np.float32(repr(part))
+    assert told.front.C in (1.3, 1.6)
+
+
 def test_what_has_no_mass_has_no_file():
     with pytest.raises(InputError, match="semi_trailer: a car's file needs mass, yaw_inertia, front, rear"):
         vehicles.specification_of(sets.CARS["semi_trailer"]())

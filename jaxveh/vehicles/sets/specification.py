@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from jaxveh._core.errors import InputError
+from jaxveh._core.plain import plain_float
 from jaxveh.io import AxleTyre, CarSpecification
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.sets.numbers import NAMED_ALIKE, SHARES, CarNumbers, TyreNumbers, named_alike
@@ -66,7 +67,10 @@ def specification_of(numbers: CarNumbers) -> CarSpecification:
     return CarSpecification(
         name=numbers.name,
         **{name: getattr(numbers, name) for name in (*NAMED_ALIKE, *SHARES, *optional)},
-        **{axle: AxleTyre(*map(float, (t.B, t.C, t.D, t.E)), nominal_load=loads[axle]) for axle, t in tyres.items()},
+        **{
+            axle: AxleTyre(*map(plain_float, (t.B, t.C, t.D, t.E)), nominal_load=loads[axle])
+            for axle, t in tyres.items()
+        },
         steer_offset=-numbers.steer_offset or None,
         **told,
     )
