@@ -161,8 +161,8 @@ class Marginalised(AbstractParticleFilter):
     Gaussian: each particle carries the exact Gaussian of its linear states. With z the other states, x the linear
     states, and J the slopes of the transition with respect to x:
 
-        (z, x)_{k+1} ~ N(f, J P J^T + Q),   z is drawn, x is given z:   what z's draw says of x is used
-        weights: N(y; h, H P H^T + R),      and x is given y
+        (z, x)_{k+1} ~ N(f, J P J^T + Q),   z is drawn, and x conditioned on the drawn z
+        weights: N(y; h, H P H^T + R),      and x is conditioned on y
 
     It needs fewer particles than a filter that draws all states; the more the linear states vary, the fewer. Every other state
     must have process noise, and all noises must have covariances. A model that is not linear in `linear` raises `InputError`.
