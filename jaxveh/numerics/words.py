@@ -21,7 +21,7 @@ def sin_cos_of_word(word: Array, dtype: jax.typing.DTypeLike) -> tuple[Array, Ar
     # The low three bits select, and are set to 7 in the angle: after 3 is subtracted, it is symmetric about 0 and never 0.
     integer = lax.bitcast_convert_type(word | bits_of(word, 7), signed)
     unit = 2.0 ** (1 - bits)
-    # The sum between the scales also keeps XLA from joining them: the powers of so small a constant underflow.
+    # The subtraction between the two factors also prevents XLA from merging them: powers of so small a constant underflow.
     r = (integer.astype(dtype) * unit - 3 * unit) * (math.pi / 4)
     t = r * r
     sine = r + r * t * polynomials.evaluate(

@@ -46,12 +46,12 @@ class AbstractFault(AbstractDeviceWrapper):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The inner device's."""
+        """The channels of the inner device."""
         return self.device.channels
 
     @property
     def units(self) -> dict[str, str]:
-        """The inner device's."""
+        """The units of the inner device's channels."""
         return self.device.units
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> Channels:
