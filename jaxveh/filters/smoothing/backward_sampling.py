@@ -37,7 +37,7 @@ def check_density(model: StateSpace) -> None:
     still = [name for name in model.states if name not in names]
     if still:
         raise InputError(
-            f"BackwardSampling needs process noise on every state; {', '.join(still)}: has none. Use Genealogy()."
+            f"BackwardSampling needs process noise on every state; without it: {', '.join(still)}. Use Genealogy()."
         )
 
 

@@ -98,7 +98,7 @@ class HaarParticles(AbstractHaar):
         if not isinstance(self.inner, AbstractParticleFilter):
             kind = type(self.inner).__name__
             raise InputError(
-                f"HaarParticles: {kind} inside: must be a particle filter; for Gaussian filters there is HaarNoise."
+                f"HaarParticles: {kind} inside: must be a particle filter. For Gaussian filters use HaarNoise."
             )
         check_one_of("HaarParticles.follows", self.follows, ("gaussian", "both"))
 
