@@ -42,7 +42,9 @@ def normals(key: Array, count: int, shape: Shape = (), dtype: DTypeLike | None =
     """
     shape, count = _shape(shape), operator.index(count)
     if count < 0 or count * math.prod(shape) >= 2**31:
-        raise ValueError(f"{count} arrays of shape {shape} from one key; at most 2^31 - 1 numbers are possible: split the key.")
+        raise ValueError(
+            f"{count} arrays of shape {shape} from one key; at most 2^31 - 1 numbers are possible: split the key."
+        )
     return _normals(key, count, shape, _dtype(dtype))
 
 

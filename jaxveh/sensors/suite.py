@@ -103,7 +103,9 @@ class Suite(eqx.Module):
         truth_times, outputs = _check_truth(truth_times, as_mapping(outputs, "outputs"))
         times = self.sample_times(duration)
         if not times.size:
-            raise InputError(f"Suite.record: no device sends a sample within the duration = {duration} s: make it longer.")
+            raise InputError(
+                f"Suite.record: no device sends a sample within the duration = {duration} s: make it longer."
+            )
         channels = {}
         for device, own in zip(self.devices, device_keys(self.devices, key), strict=True):
             check_outputs(device, outputs)

@@ -104,7 +104,9 @@ class AbstractRuleFilter(AbstractGaussianFilter):
             value = getattr(self, entry.name)
             if entry.name != "form" and isinstance(value, AbstractForm):
                 kind, form = type(self).__name__, type(value).__name__
-                raise InputError(f"{kind}.{entry.name} = {form}(): is a form; pass it by keyword, {kind}(form={form}()).")
+                raise InputError(
+                    f"{kind}.{entry.name} = {form}(): is a form; pass it by keyword, {kind}(form={form}())."
+                )
 
     @property
     def gradients(self):
@@ -208,7 +210,7 @@ def kind_of_law(model: StateSpace) -> AbstractNoise:
 def check_kind(who: str, filter: Any, kind: type) -> None:
     """Raise `InputError` unless the filter is of the kind that a wrapper can wrap."""
     if not isinstance(filter, kind):
-        what = "a Gaussian filter without wrappers: those go outside" if kind is AbstractRuleFilter else "a Gaussian filter"
+        what = "an unwrapped Gaussian filter" if kind is AbstractRuleFilter else "a Gaussian filter"
         raise InputError(f"{who}: {type(filter).__name__} inside: must be {what} (Kalman, Extended, Unscented, ...).")
 
 

@@ -40,7 +40,9 @@ def check_linear(who: str, model: StateSpace) -> None:
         ):
             if np.any(values):
                 name = names[int(np.argmax(values))]
-                raise InputError(f"{who}: {what} {name} is not a linear function of the state. Use Extended or Unscented.")
+                raise InputError(
+                    f"{who}: {what} {name} is not a linear function of the state. Use Extended or Unscented."
+                )
     if varies:
         raise InputError(
             f"{who}: the measurement noise depends on the state. Use Extended, Unscented or a particle filter."

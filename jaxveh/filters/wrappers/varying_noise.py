@@ -73,7 +73,9 @@ class VaryingNoise(AbstractWrapper):
         for what, law in laws:
             if not isinstance(law, Gaussian):
                 kind = type(law).__name__
-                raise InputError(f"VaryingNoise: the {what} is {kind}: must be Gaussian, one standard deviation per field.")
+                raise InputError(
+                    f"VaryingNoise: the {what} is {kind}: must be Gaussian, one standard deviation per field."
+                )
         if self.measurement:
             kit.check_noise_by_row("VaryingNoise", self.inner)
         self.inner.check(model)
