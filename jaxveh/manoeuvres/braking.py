@@ -59,9 +59,9 @@ def braking_in_a_turn(
 ) -> Braking:  # fmt: skip
     """Braking in a turn with a constant `steer` (rad at the road wheels), from `speed` (m/s) (ISO 7975).
 
-    The steer rises over `ramp` (s) from `start` (s) on; the brakes act from `brake_at` (s) on, over `brake_ramp` (s),
-    up to `deceleration` (m/s^2). For cars driven by torques, the brake torque is `mass wheel_radius deceleration` (kg,
-    m), and before braking there is a constant `drive_torque` (N m; both at the wheels). `duration` (s).
+    The steer rises over `ramp` from `start` on; the brakes act from `brake_at` on, and rise over `brake_ramp` (s) to
+    `deceleration` (m/s^2). For cars driven by torques, the brake torque is `mass wheel_radius deceleration` (kg, m),
+    and before braking there is a constant `drive_torque` (N m, both at the wheels).
 
     **Raises** `InputError` for values out of range, or a brake that is not fully applied within the duration.
     """

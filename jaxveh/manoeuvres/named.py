@@ -29,7 +29,11 @@ class DriveSettings(NamedTuple):
 
 
 class NamedManoeuvre(NamedTuple):
-    """A function that makes a manoeuvre, its help text, and whether it is in closed loop and has pedals."""
+    """A named manoeuvre.
+
+    `make`: the function that makes it; `help`: one line about it; `closed_loop`: whether its driver uses feedback;
+    `pedals`: whether its inputs include pedals.
+    """
 
     make: Callable[[DriveSettings], AbstractManoeuvre | AbstractDriver]
     help: str

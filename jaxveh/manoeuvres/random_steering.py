@@ -37,7 +37,7 @@ def random_steering(
 
     The steer is white between the frequencies `lowest` and `highest` (Hz): `count` harmonics of equal amplitude, each
     with a random frequency in its own equal part of the band and a random phase, drawn from `key`. `edge` (s): length
-    of the smooth fades at both ends. `duration` (s).
+    of the smooth fades at both ends.
 
     **Raises** `InputError` for values out of range.
     """

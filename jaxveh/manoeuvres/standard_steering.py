@@ -48,8 +48,7 @@ class SineWithDwell(AbstractRounded):
 
 
 class RampSteer(AbstractRounded):
-    """Steer that grows linearly over `rise` (s) from `start` (s) on and is then constant (ISO 4138, constant speed,
-    variable steer)."""
+    """Steer that grows linearly over `rise` from `start` on and is then constant (ISO 4138, constant speed, variable steer)."""
 
     _: KW_ONLY
     rise: float = eqx.field(static=True)
@@ -111,8 +110,8 @@ def ramp_steer(
     """Steer that grows at a constant rate to `steer` (rad at the road wheels) at `speed` (m/s) and is then constant.
 
     `rise` (s): the time over which it grows, from `start` (s) on; if it is long enough, the car is in steady state
-    throughout (ISO 4138, constant speed with variable steer). `edge` (s): the time over which corners are rounded.
-    `duration` (s): by default until 2 s after the end.
+    throughout (ISO 4138, constant speed with variable steer). `edge` (s, over which corners are rounded). `duration`
+    (s): by default until 2 s after the end.
 
     **Raises** `InputError` for values out of range, or a ramp that does not end within the duration.
     """
@@ -134,8 +133,8 @@ def slalom(
     """Sine periods of steer with peaks of `steer` (rad at the road wheels) at `speed` (m/s), open loop.
 
     `frequency` (Hz); `periods`: their number, from `start` (s) on. For cones at a distance d from each other the
-    frequency is `speed / (2 d)`. `edge` (s): the time over which the phase starts and stops. `duration` (s): by default
-    until 1 s after the end. For a slalom in closed loop see `slalom_course`.
+    frequency is `speed / (2 d)`. `edge` (s, over which the phase starts and stops). `duration` (s): by default until 1
+    s after the end. For a slalom in closed loop see `slalom_course`.
 
     **Raises** `InputError` for values out of range, or periods that do not end within the duration.
     """

@@ -38,7 +38,7 @@ class DoubleLaneChange(AbstractSteering):
 
 
 class StepSteer(AbstractSteering):
-    """Straight ahead until `start` (s), then a smooth ramp of length `ramp` (s) to a constant `steer`."""
+    """Straight ahead until `start`, then a smooth ramp of length `ramp` to a constant `steer`."""
 
     _: KW_ONLY
     ramp: float = eqx.field(static=True)
@@ -68,9 +68,9 @@ def double_lane_change(
 ) -> DoubleLaneChange:
     """A double lane change at `speed` (m/s) with steer peaks of plus and minus `steer` (rad at the road wheels).
 
-    The car drives straight ahead until `start`, then there are one sine `period` (left first for positive steer), a
-    `pause`, the mirrored period, and driving straight ahead until `duration` (all in s). The paper of Bao, Sabbioni et
-    al. (2015) shows no steering trace: the shape is our choice.
+    The car drives straight ahead until `start`; then follow one sine `period` (left first for positive steer), a
+    `pause` and the mirrored period, and it drives straight ahead until `duration` (all in s). The paper of Bao,
+    Sabbioni et al. (2015) shows no steering trace: the shape is our choice.
 
     **Raises** `InputError` for values out of range, or where the two periods do not fit into the duration.
     """
@@ -86,8 +86,8 @@ def double_lane_change(
 
 
 def step_steer(speed, steer, *, ramp: float = 0.2, start: float = 1.0, duration: float = 7.0) -> StepSteer:
-    """A steer step to `steer` (rad at the road wheels) at `speed` (m/s): straight ahead until `start` (s), a smooth
-    `ramp` (s), then constant steer.
+    """A steer step to `steer` (rad at the road wheels) at `speed` (m/s): straight ahead until `start`, a smooth `ramp`
+    (s), then constant steer.
 
     **Raises** `InputError` for values out of range, or where the ramp does not end within the duration.
     """
@@ -109,8 +109,7 @@ def swept_sine(
 ) -> SweptSine:
     """A sine steer of amplitude `steer` (rad at the road wheels) at `speed` (m/s) with a linearly rising frequency.
 
-    The frequency rises from `from_frequency` to `to_frequency` (Hz) over `duration` (s). `edge` (s): length of the
-    smooth fades at both ends.
+    `from_frequency` (Hz, at the start), `to_frequency` (Hz, at the end), `edge` (s): length of the smooth fades at both ends.
 
     **Raises** `InputError` for values out of range, or edges that are longer than the duration together.
     """

@@ -132,8 +132,8 @@ class Spikes(AbstractFault):
 class Dropout(AbstractFault):
     """`channel` (a name, several, or None for all) has no samples (NaN) in `spans`, and loses each sample with `probability`.
 
-    `spans`: ((start, end), ...) in s. The channels are lost together, as when a message is lost; for channels with
-    other gaps, wrap the device once more. Without a key, only the spans have gaps.
+    `spans`: ((start, end), ...) in s. The channels are lost together, as when a message is lost; for gaps at different
+    times, wrap it once more. Without a key, only the spans have gaps.
 
     **Raises** `InputError` for reversed spans, a probability outside 0 to 1, or neither of the two.
     """

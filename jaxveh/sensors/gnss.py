@@ -25,8 +25,8 @@ _MORE_UNITS = {"heading": "rad", "climb_rate": "m/s"}
 
 
 class GNSS(AbstractInstrument):
-    """A receiver that measures `speed` (m/s) and `course` (rad) of its antenna over ground and, with `position`, `x`
-    and `y` (m).
+    """A receiver that measures `speed` (m/s) and `course` (rad) of its antenna over ground and, with `position`, its
+    position `x`, `y` (m).
 
     - `along`, `across` (m/s): standard deviations of the measured velocity along and across the true one; white. The
       course is the angle of the measured velocity from the world's x axis, positive to the left, within -pi to pi.

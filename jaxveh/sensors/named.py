@@ -14,8 +14,11 @@ from jaxveh.vehicles import kit
 
 
 class NamedDevices(NamedTuple):
-    """A function that makes the sensors of a car, and its help text; `takes_noise`: standard deviations by channel may
-    be given."""
+    """A named set of sensors or devices.
+
+    `make`: the function that makes them for a car; `help`: one line about them; `takes_noise`: whether standard
+    deviations by channel may be given.
+    """
 
     make: Callable[[Any, Mapping[str, Any]], SensorSet | Suite | None]
     help: str

@@ -65,8 +65,8 @@ def log_likelihood_spread(
 ) -> LogLikelihoodSpread:
     """The scatter over keys of a filter's log-likelihood of one recording.
 
-    `runs`: at least two; 50 give the standard deviation to 10 %. `batch`, `progress` and `throw` as in `monte_carlo`.
-    For particle Metropolis-Hastings, compute it near the posterior's mean.
+    `batch`, `progress` and `throw` as in `monte_carlo`. For particle Metropolis-Hastings, compute it near the
+    posterior's mean. `runs`: at least two (50 give the standard deviation to 10 %).
 
     **Raises** `InputError` where the arguments do not agree or the filter draws nothing; `FilterError` where runs fail.
     """

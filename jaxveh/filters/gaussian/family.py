@@ -64,7 +64,10 @@ class Unscented(AbstractRuleFilter):
 
 
 class Simplex(AbstractRuleFilter):
-    """The unscented filter with the fewest points: n+2, on a spherical simplex and its centre (S. Julier 2003)."""
+    """The unscented filter with the fewest points: n+2, on a spherical simplex and at its centre (S. Julier 2003).
+
+    `central`: weight of the point at the centre.
+    """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
     central: float = eqx.field(static=True, default=0.0)

@@ -64,7 +64,7 @@ class HaarNoise(AbstractHaar, AbstractLearnedNoise):
 
     Until a channel has had `fewest` rows (at least 2; None: a full window, as in the paper), its variance is `initial` times the
     model's own; after that, the median is over the rows that the window has so far. If the noise may be far above the data
-    sheet's from the first row on, choose a large `initial`: a slow state keeps an error that it takes from the first rows.
+    sheet's from the first row on, choose a large `initial`, as a slow state keeps an error that it takes from the first rows.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
