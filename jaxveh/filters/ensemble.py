@@ -60,8 +60,8 @@ class Ensemble(AbstractTwoPartFilter):
     Every member is propagated with a draw of the process noise and then moved towards the measurement by the gain of
     the ensemble's own covariances. `perturbed=True`: each member moves towards the measurement plus a draw of its
     noise. Otherwise the update is deterministic (J. Whitaker & T. Hamill 2002): the mean moves by the gain and the
-    deviations by a smaller one, without that sampling error. With M channels the gain has errors of about sqrt(M /
-    members), so that it is exact only in the limit.
+    deviations by a smaller one, without that sampling error. With M channels the gain has errors of about
+    sqrt(M / members), so that it is exact only in the limit.
 
     Noises must have covariances; a measurement noise that depends on the state is taken at the members' mean. The
     gradients are exact, as no member is drawn by weights.

@@ -133,8 +133,9 @@ class Guided(AbstractParticleFilter):
     than the process noise; each particle costs a small Kalman update. **Where the observation is nonlinear over the process
     noise, do not use it**: with `"extended"` it loses particles that the linearisation does not foresee, and the effective
     sample size does not show this, as it rises (one recording of the growth model, 40 rows, 1000 particles: log-likelihood 1.5
-    too low, standard deviation 1.9, ESS 700; without `auxiliary` 0.6, 0.8 and 550). Rows whose weights show it have `info.remark
-    = Result.lookahead_misled`. The process noise must be Gaussian, and the measurement noise must have a covariance.
+    too low, standard deviation 1.9, ESS 700; without `auxiliary` 0.6, 0.8 and 550). Rows whose weights show it have
+    `info.remark = Result.lookahead_misled`. The process noise must be Gaussian, and the measurement noise must have a
+    covariance.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.particles

@@ -19,8 +19,8 @@ class Turn(NamedTuple):
     """One of several filters that exchange results.
 
     `told`: the values that the filters exchange, a pytree of arrays that the caller defines. `filter` and `model`: the
-    filter and its model; `listen(told)` returns the system of the model, such as a car, for these values; `tell(belief,
-    row, told)` returns `told` with this filter's own results inserted after its step.
+    filter and its model; `listen(told)` returns the system of the model, such as a car, for these values;
+    `tell(belief, row, told)` returns `told` with this filter's own results inserted after its step.
     """
 
     filter: AbstractFilter

@@ -36,8 +36,8 @@ from jaxveh.statespace import AbstractBelief, StateSpace, kit
 class MarginalisedBelief(AbstractBelief):
     """Weighted particles, each with a Gaussian over the linear states.
 
-    `particles`: the state's NamedTuple with (N,) in each field, the conditional means for the linear states; `covariances` (N,
-    l, l) of the linear states given each particle, in the order of the filter's `linear`; `weights` (N,), `ancestors` (N,).
+    `particles`: the state's NamedTuple with (N,) in each field, the conditional means for the linear states; `covariances`
+    (N, l, l) of the linear states given each particle, in the order of the filter's `linear`; `weights` (N,), `ancestors` (N,).
     """
 
     particles: Any

@@ -57,7 +57,7 @@ MANOEUVRES: dict[str, NamedManoeuvre] = {
     ),
     "slalom": NamedManoeuvre(lambda d: slalom(d.speed, d.steer, **d.options), "sine periods of steer, open loop"),
     "random-steering": NamedManoeuvre(
-        lambda d: random_steering(d.speed, d.steer, d.key, **d.options), "random steer in a band (ISO 7401); steer: std"
+        lambda d: random_steering(d.speed, d.steer, d.key, **d.options), "random steer in a band (ISO 7401); steer is its std"
     ),
     "braking-in-a-turn": NamedManoeuvre(
         lambda d: braking_in_a_turn(d.speed, d.steer, **d.options), "braking with constant steer (ISO 7975)", pedals=True

@@ -30,11 +30,11 @@ _CRAWL = 0.5
 class SpeedControl(AbstractDriver):
     """The steering of a driver or a manoeuvre, with pedals that make the car follow its demanded speed.
 
-    The demanded acceleration is `v_x_rate + gain e + integral`, with `e = v_x - motion.v_x` and `d integral/dt = gain e
-    / integral_time`. The force is `mass` times this acceleration, plus air drag and rolling resistance. It is limited
-    to `drive_limit` and `brake_limit` with smooth corners; while a limit acts, the integral is constant (conditional
-    integration, K. J. Astrom and T. Hagglund, Advanced PID Control, sec. 3.5), so that it does not wind up. A positive
-    force becomes `drive_torque`, a negative one `brake_torque` (N m, total at the wheels, never negative; within 0.1
+    The demanded acceleration is `v_x_rate + gain e + integral`, with `e = v_x - motion.v_x` and
+    `d integral/dt = gain e / integral_time`. The force is `mass` times this acceleration, plus air drag and rolling resistance.
+    It is limited to `drive_limit` and `brake_limit` with smooth corners; while a limit acts, the integral is constant
+    (conditional integration, K. J. Astrom and T. Hagglund, Advanced PID Control, sec. 3.5), so that it does not wind up. A
+    positive force becomes `drive_torque`, a negative one `brake_torque` (N m, total at the wheels, never negative; within 0.1
     m/s^2 of zero both are positive, for a smooth transition). The pedals of the wrapped driver are added.
 
     **Parameters**: `mass` (kg), `wheel_radius` (m), `gain` (1/s), `integral_time` (s), `drag_area` (m^2: drag

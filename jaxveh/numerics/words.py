@@ -13,8 +13,8 @@ from jaxveh.numerics.float_bits import bits_of, flip_sign
 def sin_cos_of_word(word: Array, dtype: jax.typing.DTypeLike) -> tuple[Array, Array]:
     """Sine and cosine of an angle that is uniform over the circle, from random words: uint32, or uint64 for float64.
 
-    Two bits choose the signs, one bit whether sine and cosine are swapped, and the others an angle in (-pi / 4, pi /
-    4), so that neither a reduction nor a long polynomial is needed.
+    Two bits choose the signs, one bit whether sine and cosine are swapped, and the others an angle in
+    (-pi / 4, pi / 4), so that neither a reduction nor a long polynomial is needed.
     """
     bits = 8 * word.dtype.itemsize
     signed = jnp.int32 if bits == 32 else jnp.int64

@@ -30,8 +30,8 @@ class LaneCamera(AbstractSignalInstrument):
       straight lane along x.
     - `position`: position of the camera from the centre of gravity. Its height has no effect, and pitch and roll are
       taken as compensated by its calibration.
-    - `reach` (m): at a larger distance from the middle no line is detected. `loss_rate` (1/s) and `loss_length` (mean,
-      s): the lines are lost at random (worn paint, wipers, low sun). In both cases all channels are NaN.
+    - `reach` (m): at a larger distance from the middle no line is detected. `loss_rate` (1/s) and `loss_length`
+      (mean, s): the lines are lost at random (worn paint, wipers, low sun). In both cases all channels are NaN.
 
     A typical camera has 30 Hz, a delay of 80 ms, and errors of 0.03 m in `lane_offset` and 0.2 degrees in `lane_heading`.
 

@@ -42,8 +42,8 @@ class WheelSpeeds(AbstractInstrument):
       stored `radius`) and `omega_fl` ... (rad/s). Channels given as names only have no errors. The difference between a
       tyre's radius and the stored radius is the signal's `scale`: a smaller tyre spins faster at the same speed.
       `noise` and the other errors are added to those of the teeth.
-    - `teeth`: edges per revolution. `method`: "M" counts the edges of one period, so that speeds are multiples of `2 pi
-      / (teeth period)`; "M/T" divides them by the time between the last edges of two periods, which is exact at
+    - `teeth`: edges per revolution. `method`: "M" counts the edges of one period, so that speeds are multiples of
+      `2 pi / (teeth period)`; "M/T" divides them by the time between the last edges of two periods, which is exact at
       constant speed, and between edges keeps the last speed until a lower speed is certain (Ohmae et al., IEEE Trans.
       Industrial Electronics 29, 1982).
     - `tooth_error`: standard deviation of the position of each edge, relative to the pitch of the teeth ("M/T" only).

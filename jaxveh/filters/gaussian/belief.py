@@ -14,8 +14,8 @@ from jaxveh.statespace import AbstractBelief
 
 
 class GaussianBelief(AbstractBelief):
-    """A Gaussian over the state, in the order of the state's fields: its mean (n,) is `vector`, and `factor` is a factor F
-    (n, n) of its covariance P = F F^T; `matrix` is P if the filter's form stores it, otherwise None."""
+    """A Gaussian over the state, in the order of the state's fields. `vector`: the mean (n,); `factor`: a factor F (n, n) of the
+    covariance P = F F^T; `matrix`: P if the filter's form stores it, otherwise None."""
 
     vector: jax.Array
     factor: jax.Array

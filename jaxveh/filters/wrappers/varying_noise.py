@@ -16,12 +16,12 @@ from jaxveh.statespace import AbstractFilter, AbstractWrapper, Continuous, Discr
 class VaryingNoise(AbstractWrapper):
     """Any filter `inner`, with standard deviations that are inputs of the model, row by row.
 
-    `measurement`: by channel, the input that is its standard deviation (in its unit) in the same row (`{"gnss_speed":
-    "gnss_speed_accuracy"}`). `process`: by state, the input that is its process noise (unit per root second, or per
-    step, as in the model). Its value is that of the step's first row, or with `process_of="after"` that of its last
-    row, the one being filtered, if the input describes the time before its row (such as a brake used since the row
-    before). The model's noises must be Gaussian, with one standard deviation per field; fields that are not named keep
-    theirs. Values that are not positive lead to a result code.
+    `measurement`: by channel, the input that is its standard deviation (in its unit) in the same row
+    (`{"gnss_speed": "gnss_speed_accuracy"}`). `process`: by state, the input that is its process noise (unit per root
+    second, or per step, as in the model). Its value is that of the step's first row, or with `process_of="after"` that
+    of its last row, the one being filtered, if the input describes the time before its row (such as a brake used since
+    the row before). The model's noises must be Gaussian, with one standard deviation per field; fields that are not
+    named keep theirs. Values that are not positive lead to a result code.
     """
 
     whitens: ClassVar[bool] = True
