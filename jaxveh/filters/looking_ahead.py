@@ -160,8 +160,8 @@ def remark_of(weights: Any, log_drawn: Any) -> Any:
 
 
 def noises(model: StateSpace, row, particles, dt: Any) -> tuple[AbstractNoise, Any]:
-    """The law of the process noise over `dt`, and the covariance of the measurement noise by channel: (m, m), or (m, m,
-    N) if it depends on the particles' states."""
+    """The law of the process noise over `dt`, and the covariance of the measurement noise by channel: (m, m), or
+    (m, m, N) if it depends on the particles' states."""
     assert model.process_noise is not None  # `PredictiveLikelihood.check` ensures it
     process = model.process_noise.over(dt)
     if not isinstance(model.measurement_noise, StateDependent):

@@ -6,8 +6,8 @@ from jax import Array
 
 
 def solve_scalars(lower: Sequence[Sequence[Array]], b: Sequence[Array]) -> list[Array]:
-    """The solution x of A x = b for a symmetric, positive definite A with the rows `lower` up to the diagonal (1, 2,
-    ... n entries).
+    """The solution x of A x = b for a symmetric, positive definite A with the rows `lower` up to the diagonal
+    (1, 2, ... n entries).
 
     It works elementwise: entries broadcast against each other, without an axis of rows. It is Cholesky's factorisation
     without roots, A = L D L^T, written out; it does not detect a matrix that is not positive definite.

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 
 def interpolate_linear(x: jax.Array, points: jax.Array, values: jax.Array) -> jax.Array:
-    """Linear interpolation between `points` (n,), rising, n >= 2, with `values` (n,); constant beyond. Returns the
+    """Linear interpolation between `points` (n,), rising, n >= 2, with `values` (n,); constant beyond. The result has the
     shape of x."""
     left, share, _ = _place(x, points)
     return values[left] + share * (values[left + 1] - values[left])

@@ -56,8 +56,8 @@ class Iterated(AbstractStateless):
 
 
 def linearise_image(image: Image, vector: Any, factor: Any, belief: Any) -> Image:
-    """The image under `belief` of the linear function with error that `image`, an image under N(vector, factor
-    factor^T), gives."""
+    """The image under `belief` of the linear function with error that follows from `image`, the image of the Gaussian with
+    mean `vector` and this `factor`."""
     slope, rest = line_through(image, factor)
     X = image.spread
     mean = image.mean + times(slope, belief.vector - vector)

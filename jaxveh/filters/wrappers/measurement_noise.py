@@ -64,8 +64,8 @@ class SageHusa(AbstractLearnedNoise):
 
 
 class Precisions(NamedTuple):
-    """The inverse-gamma laws of the variances (m,): `shape` (-) and `scale` (the channel's unit squared); 1 / E[1 /
-    variance] is scale / shape."""
+    """The inverse-gamma laws of the variances (m,): `shape` (-) and `scale` (the channel's unit squared);
+    1 / E[1 / variance] is scale / shape."""
 
     shape: Any
     scale: Any
