@@ -35,7 +35,7 @@ class AdaptiveNumber(AbstractWrapper):
         n = (k - 1) / (2 error) (1 - 2 / (9 (k - 1)) + z sqrt(2 / (9 (k - 1))))^3
 
     `bins`: the width of the bins by state, in the state's unit (parameters on the real line). The largest size is the
-    number of particles of `inner`. The filter starts with it, and it resamples in every step. Shapes are fixed when
+    number of particles of `inner`. The filter starts with it and resamples in every step. Shapes are fixed when
     compiling: there is one branch per size, of which one runs, and every belief has the largest size, filled up with
     particles of zero weight. Under `vmap` all branches run, and no time is saved.
     """

@@ -1,6 +1,6 @@
 """The choice of the next particles, and how derivatives pass through it: by a score, or by softened weights."""
 
-# No postponed annotations in this file: they would make fields of class variables.
+# No postponed annotations in this file: they would turn class variables into fields.
 
 import abc
 from collections.abc import Callable

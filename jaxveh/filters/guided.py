@@ -200,7 +200,7 @@ class Guided(AbstractParticleFilter):
         white = numerics.normal(noise, (len(law.names), self.particles), logs.dtype)
         e = chosen.mean.T + jnp.einsum("iqr,ri->qi", chosen.factor, white)
         x = _add_to_states(start, law.names, e)
-        # A particle drawn from its proposal, too, may not be finite.
+        # A draw from a proposal, too, can give a particle that is not finite.
         x, astray = replace_lost(x, start)
         ratio = _log_normal(numerics.solve_lower(prior.factor, e), prior.factor) - _log_normal(white, chosen.factor)
         stage = FirstStage(proposals.log_ahead, first, log_first, ancestors, resampled, alive)

@@ -35,7 +35,7 @@ class AbstractLookahead(eqx.Module):
     no second-stage weight exceeds the likelihood by more than a factor of 1 / share, however wrong the look-ahead is.
     """
 
-    # No postponed annotations in this file: they would make a field of it.
+    # No postponed annotations in this file: they would turn this into a field.
     defensive: eqx.AbstractVar[float]
 
     @abc.abstractmethod

@@ -10,7 +10,7 @@ from jaxveh.statespace import AbstractBelief
 class AbstractOuterBelief(AbstractBelief):
     """A belief around that of another filter, `inside`; its time, inputs and count of rows are those of `inside`."""
 
-    # No postponed annotations in this file: equinox does not see an AbstractVar in a string.
+    # No postponed annotations in this file: equinox does not recognise an AbstractVar in a string.
     inside: eqx.AbstractVar[Any]
 
     @property

@@ -83,7 +83,7 @@ def _rotate(along, across, direction) -> PathTarget:
 
 
 class Straight(AbstractGraph):
-    """A straight line along x, `left` (m, default 0) of the x axis."""
+    """A straight line along x, at a distance `left` (m, default 0) to the left of the x axis."""
 
     left: jax.Array = parameter("m", scale=1.0, default=0.0)
 

@@ -111,7 +111,7 @@ def swept_sine(
 
     `from_frequency` (Hz, at the start), `to_frequency` (Hz, at the end), `edge` (s): length of the smooth fades at both ends.
 
-    **Raises** `InputError` for values out of range, or edges that are longer than the duration together.
+    **Raises** `InputError` for values out of range, or edges that together are longer than the duration.
     """
     check_drive(speed, duration, steer)
     check_positive("from_frequency", from_frequency, "Hz")

@@ -2,7 +2,7 @@
 
 One rule: a value that is used several times and costs more to compute than to store is fenced at the end of the
 function that computes it, by a decorator (`fence_results`) or in its last statement. Formulas of tyres and vehicles
-stay as in the book; the few that do not give a measured number as the reason (`tests/core/test_where_fences_stand.py`).
+stay as in the book; each exception has a measured number as its reason (`tests/core/test_where_fences_stand.py`).
 
 - `fence(tree)`: an optimization barrier. XLA respects it from jax 0.12 on; before that, only speed is lost.
 - `fence(tree, firm=True)`: a fence in every version of jax.

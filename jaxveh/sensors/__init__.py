@@ -1,4 +1,4 @@
-"""The sensors of a car: sets of channels for filters, and devices with the rates, delays and errors of a real car's."""
+"""The sensors of a car: sets of channels for filters, and devices with the rates, delays and errors of those in a real car."""
 
 from jaxveh.sensors.camera import LaneCamera
 from jaxveh.sensors.device import AbstractDevice, AbstractInstrument

@@ -1,4 +1,4 @@
-"""How much a particle filter's log-likelihood scatters from key to key."""
+"""The scatter of a particle filter's log-likelihood from key to key."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ class AbstractRuleFilter(AbstractGaussianFilter):
     Kalman filter).
     """
 
-    # No postponed annotations in this file: they would make a field of it.
+    # No postponed annotations in this file: they would turn this into a field.
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     written_out: ClassVar[bool] = True

@@ -161,7 +161,8 @@ class SquareRoot(AbstractForm):
         n = X.shape[0]
         above = _with_noise(image.deviations, law, fields)
         below = jnp.pad(X, ((0, 0), (0, above.shape[1] - X.shape[1])))
-        # The later state conditions the earlier one as a measurement does: the rest of the covariance, and the part by the gain.
+        # The earlier state is conditioned on the later one, as on a measurement. To the rest of its covariance, the
+        # smoothed covariance of the later state is added by the gain.
         whole = numerics.lower_factor(_wide(jnp.concatenate([above, below])))
         gain = numerics.solve_lower_transposed(whole[:n, :n], whole[n:, :n].T).T
         factor = numerics.lower_factor(jnp.concatenate([whole[n:, n:], times(gain, later.spread.factor)], axis=1))
@@ -169,7 +170,7 @@ class SquareRoot(AbstractForm):
 
 
 class SingularValues(AbstractForm):
-    """The factor U sqrt(D) of the covariance's singular value decomposition U D U^T, of which the federated cubature
+    """The factor U sqrt(D) of the covariance's singular value decomposition U D U^T, from which the federated cubature
     filter of Ji, Li & Fan takes its points.
 
     The deviations are decomposed, not the covariance. If singular values coincide, their vectors are undefined, and so

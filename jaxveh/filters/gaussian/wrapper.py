@@ -11,7 +11,7 @@ from jaxveh.statespace import AbstractWrapper
 class AbstractGaussianWrapper(AbstractGaussianFilter, AbstractWrapper):
     """A Gaussian filter around another, `inner`: a subclass defines only its differences from `inner`."""
 
-    # No postponed annotations in this file: they would make fields of it and of class variables.
+    # No postponed annotations in this file: they would turn this and class variables into fields.
     inner: eqx.AbstractVar[AbstractGaussianFilter]
     written_out: ClassVar[bool] = True
 
