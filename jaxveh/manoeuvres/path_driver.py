@@ -25,22 +25,20 @@ _CRAWL = 1.0
 class PathDriver(AbstractDriver):
     """A driver with single-point preview, who turns the wheel until the arc of the car meets the path's point ahead.
 
-    In axes along the car's course (yaw + sideslip), the path's point at the distance v_x T_p is (ahead, left). The arc
-    to it has the curvature kappa, the arc of the car has kappa_now, and the wheel turns at the rate
+    In axes along the car's course (yaw + sideslip), the path's point at the distance v_x T_p is (ahead, left). The arc to it has
+    the curvature kappa, the arc of the car has kappa_now, and the wheel turns at the rate
 
         kappa = 2 left / (ahead^2 + left^2),   kappa_now = yaw_rate / v_x,
         d steer/dt = gain (wheelbase + understeer_gradient v_x^2) (kappa - kappa_now) / reaction_lag.
 
-    For small angles `kappa v_x^2` is the acceleration that takes a point mass to the path after T_p: MacAdam's optimal
-    preview (C. C. MacAdam, J. Dyn. Syst. Meas. Control 102 (1980)) with all weight on one point. Because kappa_now is
-    measured and not computed from the steer, a car whose understeer gradient differs from `understeer_gradient` also
-    stays on the path. Steer and its rate stay within `steer_limit` and `rate_limit` with smooth corners. Of the future,
-    only the path is used. The driver is for driving forwards.
+    For small angles `kappa v_x^2` is the acceleration that takes a point mass to the path after T_p: MacAdam's optimal preview
+    (C. C. MacAdam, J. Dyn. Syst. Meas. Control 102 (1980)) with all weight on one point. Because kappa_now is measured and not
+    computed from the steer, a car whose understeer gradient differs from `understeer_gradient` also stays on the path. Steer and
+    its rate stay within `steer_limit` and `rate_limit` with smooth corners. Of the future, only the path is used. For driving forwards.
 
-    **Parameters**: `preview_time` T_p (s), `reaction_lag` (s), `wheelbase` (m), `understeer_gradient` (rad s^2/m, the
-    steer at the road wheels beyond the geometric one for a lateral acceleration of 1 m/s^2), `gain` (-; below 0.8, or
-    with a lag above 0.15 s, the car weaves at high speed),
-    `steer_limit` (rad), `rate_limit` (rad/s), `shortest_preview` (m, at standstill).
+    **Parameters**: `preview_time` T_p (s), `reaction_lag` (s), `wheelbase` (m), `understeer_gradient` (rad s^2/m, the steer at
+    the road wheels beyond the geometric one for a lateral acceleration of 1 m/s^2), `gain` (-; below 0.8, or with a lag above
+    0.15 s, the car weaves at high speed), `steer_limit` (rad), `rate_limit` (rad/s), `shortest_preview` (m, at standstill).
 
     **State**: `steer` (rad at the road wheels). **Inputs**: `steer`, and `v_x`, `v_x_rate` of the demanded `speed`.
 

@@ -19,17 +19,16 @@ def sum_in_blocks(function: Callable[[Any, Any], Array], parameters: Any, rows: 
     """The sum of `function(parameters, rows)` over all rows, with a gradient that is computed block by block.
 
     For fits to long tables, such as `sum_in_blocks(lambda tyre, rig: (tyre.forces(rig.contact).F_y - rig.F_y) ** 2, tyre, rig)`:
-    the value is that of `jnp.sum(function(parameters, rows))`; its gradient takes about a third of the time on a CPU
-    and a fortieth of the memory (MF-Tyre 6.1 with all coefficients, 1e5 rows: 450 instead of 1620 ns per row with jax
-    0.12, 610 instead of 1650 with 0.10, where the forces alone take 120; 5 instead of 200 MB), because intermediate
-    results stay in the processor's cache and the slopes of parameters are not summed number by number. It takes longer
-    to compile (12 instead of 7 s).
+    the value is that of `jnp.sum(function(parameters, rows))`; its gradient takes about a third of the time on a CPU and a
+    fortieth of the memory (MF-Tyre 6.1 with all coefficients, 1e5 rows: 450 instead of 1620 ns per row with jax 0.12, 610
+    instead of 1650 with 0.10, where the forces alone take 120; 5 instead of 200 MB), because intermediate results stay in the
+    processor's cache and slopes of parameters are not summed number by number. It takes longer to compile (12 instead of 7 s).
 
-    `function`: elementwise; arrays (n,) in, one array (n,) out. Everything that is differentiated must be an argument
-    of it, not in its closure. `parameters`: a pytree, such as a tyre; within a block its scalars are arrays as long as
-    the block. `rows`: a pytree of arrays (n,), and of scalars that are the same for all rows. `block`: the number of
-    rows at a time on a CPU; an accelerator takes all at once. The result is a scalar. Both modes of differentiation and
-    higher orders work, and so does `jax.vmap`; the gradient with respect to rows is computed only if it is needed.
+    `function`: elementwise; arrays (n,) in, one array (n,) out. Everything that is differentiated must be an argument of it, not
+    in its closure. `parameters`: a pytree, such as a tyre; within a block its scalars are arrays as long as the block. `rows`: a
+    pytree of arrays (n,), and of scalars that are the same for all rows. `block`: the number of rows at a time on a CPU; an
+    accelerator takes all at once. The result is a scalar. Both modes of differentiation and higher orders work, and so does
+    `jax.vmap`; the gradient with respect to rows is computed only if it is needed.
 
     **Raises** `InputError` for a block of less than one row, or rows that are not arrays of one length.
     """

@@ -85,9 +85,7 @@ def check_independent(who: str, model: StateSpace) -> None:
     kit.check_fixed(who, model.measurement_noise, "Use the inner filter without this wrapper, or a particle filter.")
     if not isinstance(model.measurement_noise, Gaussian):
         kind = type(model.measurement_noise).__name__
-        raise InputError(
-            f"{who}: the measurement noise is {kind}: must be Gaussian, one standard deviation per channel."
-        )
+        raise InputError(f"{who}: the measurement noise is {kind}: must be Gaussian, a standard deviation per channel.")
 
 
 def variances_of(model: StateSpace) -> Any:

@@ -37,11 +37,10 @@ class AbstractReweighting(AbstractStateless):
 class Huber(AbstractReweighting):
     """`inner` with Huber's loss of the innovations, linear beyond `threshold` standard deviations of the innovation.
 
-    Each channel's noise variance is divided by the weight `min(1, threshold / |e|)`, with e the innovation over its
-    predicted standard deviation (P. Huber 1964; after the reweighting of C. Karlgaard & H. Schaub 2007, who scale by
-    the standard deviation of the noise and iterate). The log-likelihood is that of the Gaussian with the larger
-    variances, not the density of Huber's law. The noise must be Gaussian, with one standard deviation per channel. A
-    filter that estimates variances goes outside this one, not inside.
+    Each channel's noise variance is divided by `min(1, threshold / |e|)`, with e the innovation over its predicted standard
+    deviation (P. Huber 1964; after C. Karlgaard & H. Schaub 2007, who scale by that of the noise and iterate). The log-likelihood
+    is that of the Gaussian with the larger variances, not the density of Huber's law. The noise must be Gaussian, with one
+    standard deviation per channel. A filter that estimates variances goes outside this one, not inside.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
@@ -62,9 +61,8 @@ class Huber(AbstractReweighting):
 class RobustStudentT(AbstractReweighting):
     """`inner` for noise of Student's t law with `dof` degrees of freedom and the model's standard deviations as scales.
 
-    A t law is a Gaussian whose precision is itself random. Variational Bayes computes the precision and the state in
-    turns, where E[(y - h)^2] is the squared residual under the state's belief plus the variance H P H^T of that belief
-    (R. Piche, S. Sarkka & J. Hartikainen 2012):
+    A t law is a Gaussian with a random precision. Variational Bayes computes the precision and the state in turns, with
+    E[(y - h)^2] the squared residual plus the variance H P H^T of the belief (R. Piche, S. Sarkka & J. Hartikainen 2012):
 
         variance / scale^2 = (dof + E[(y - h)^2] / scale^2) / (dof + 1)
 
