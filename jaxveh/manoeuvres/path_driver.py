@@ -34,7 +34,8 @@ class PathDriver(AbstractDriver):
     For small angles `kappa v_x^2` is the acceleration that takes a point mass to the path after T_p: MacAdam's optimal preview
     (C. C. MacAdam, J. Dyn. Syst. Meas. Control 102 (1980)) with all weight on one point. Because kappa_now is measured and not
     computed from the steer, a car whose understeer gradient differs from `understeer_gradient` also stays on the path. Steer and
-    its rate stay within `steer_limit` and `rate_limit` with smooth corners. Of the future, only the path is used. For driving forwards.
+    its rate stay within `steer_limit` and `rate_limit` with smooth corners. Of the future, only the path is used.
+    The driver is for driving forwards.
 
     **Parameters**: `preview_time` T_p (s), `reaction_lag` (s), `wheelbase` (m), `understeer_gradient` (rad s^2/m, the steer at
     the road wheels beyond the geometric one for a lateral acceleration of 1 m/s^2), `gain` (-; below 0.8, or with a lag above
