@@ -1,4 +1,4 @@
-"""As many particles as the belief's spread asks for."""
+"""A particle filter whose number of particles follows the spread of the belief."""
 
 from __future__ import annotations
 
@@ -19,23 +19,25 @@ from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, chec
 from jaxveh.statespace import AbstractWrapper
 
 BINS = 0x62696E73
-"""Folded into the step's key for the draw that counts bins."""
+"""Folded into the step's key for the draw by which the filled bins are counted."""
 
-# An odd number of 32 bits, for each state another power of it: a multiplicative hash.
+# An odd 32-bit number, of which each state takes another power: a multiplicative hash.
 HASH = np.uint32(2654435761)
 
 
 class AdaptiveNumber(AbstractWrapper):
-    """`inner`, each step with one of the `sizes` of particles, by how many `bins` the belief fills (D. Fox 2003: KLD-sampling).
+    """`inner` with one of `sizes` particles in each step, chosen by how many `bins` the belief fills (D. Fox 2003,
+    KLD-sampling).
 
-    So many particles that, with the `confidence` (-), the Kullback-Leibler distance between the drawn and the true distribution
-    over the k filled bins is below `error`, with z the normal quantile:
+    The number of particles n is such that, with probability `confidence` (-), the Kullback-Leibler distance between the
+    drawn and the true distribution over the k filled bins is below `error`. With z the normal quantile:
 
         n = (k - 1) / (2 error) (1 - 2 / (9 (k - 1)) + z sqrt(2 / (9 (k - 1))))^3
 
-    `bins`: their widths by state, in its unit (parameters on the real line). The largest size is the filter's own number, with
-    which it starts; it resamples in every step. Shapes are fixed when compiling: one branch a size, of which one runs, and
-    beliefs of the largest size with weights of zero behind. Under `vmap` all branches run, and nothing is saved.
+    `bins`: the width of the bins by state, in the state's unit (parameters on the real line). The largest size is the
+    number of particles of `inner`. The filter starts with it and resamples in every step. Shapes are fixed when
+    compiling: there is one branch per size, of which one runs, and every belief has the largest size, filled up with
+    particles of zero weight. Under `vmap` all branches run, and no time is saved.
     """
 
     has_covariance: ClassVar[bool] = True
@@ -75,7 +77,7 @@ class AdaptiveNumber(AbstractWrapper):
         check_ancestors("AdaptiveNumber", self.inner.resampling, "Take numerics.systematic or Soft(...).")
         if self.inner.threshold < 1:
             raise InputError(
-                f"AdaptiveNumber: its filter has threshold = {self.inner.threshold}: must resample in every step, threshold = 1."
+                f"AdaptiveNumber: inner.threshold = {self.inner.threshold}: must be 1, so that it resamples in every step."
             )
 
     def check(self, model):
@@ -91,16 +93,16 @@ class AdaptiveNumber(AbstractWrapper):
         return jax.lax.switch(place, [self._branch(size) for size in self.sizes], model, belief, row)
 
     def number(self, belief: ParticleBelief) -> Any:
-        """How many particles the belief asks for, before they are rounded up to one of the sizes."""
+        """The number of particles that the belief needs, before it is rounded up to one of the sizes."""
         dtype = belief.weights.dtype
-        # Of one filled bin nothing can be told; two ask for few.
+        # The formula has no value for one filled bin; with two it gives few particles.
         k = jnp.maximum(self.filled_bins(belief), 2).astype(dtype) - 1.0
         z = jax.scipy.special.ndtri(jnp.asarray(self.confidence, dtype))
         part = 2.0 / (9.0 * k)
         return k / (2.0 * self.error) * (1.0 - part + z * jnp.sqrt(part)) ** 3
 
     def filled_bins(self, belief: ParticleBelief) -> Any:
-        """How many bins draws from the belief fill."""
+        """The number of bins that draws from the belief fill."""
         key = jax.random.fold_in(jax.random.fold_in(belief.key, BINS), belief.count)
         ancestors = numerics.systematic(key, jax.lax.stop_gradient(belief.weights), self.inner.particles)
         drawn = jax.lax.stop_gradient(gather(belief.particles, ancestors))
@@ -117,7 +119,7 @@ class AdaptiveNumber(AbstractWrapper):
 
         def run(model, belief, row):
             after, info = inside._step(model, belief, row)
-            # Copies of the first, without weight: any number that the model can take.
+            # Filled up with copies of the first particle, of zero weight: values that the model accepts.
             longer = lambda field: jnp.concatenate([field, jnp.broadcast_to(field[:1], (more,))])
             particles = jax.tree.map(longer, after.particles)
             weights = jnp.pad(after.weights, (0, more))

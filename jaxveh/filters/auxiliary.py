@@ -30,9 +30,9 @@ from jaxveh.statespace import Smoothing
 
 
 class FirstStage(NamedTuple):
-    """The choice of ancestors: the log look-ahead `ahead` (N,), the first-stage `weights` (N,) and the logarithm of their mean
-    before they were normalised, `ancestors` (N,), whether they were drawn (`resampled`, None: always), and whether any particle
-    was `alive`."""
+    """The choice of ancestors: the log look-ahead `ahead` (N,), the first-stage `weights` (N,), the logarithm
+    `log_mean` of their mean before they were normalised, the `ancestors` (N,), whether these were drawn (`resampled`;
+    None: always), and whether any particle was `alive`."""
 
     ahead: Any
     weights: Any
@@ -43,8 +43,9 @@ class FirstStage(NamedTuple):
 
 
 class LookedAhead(AbstractAhead):
-    """Particles that wait for their second-stage weights: moved from the belief `before`, some of them `lost` (N,); where each of
-    the belief's had been judged, `characteristic`, its `residual` there by channel, and the first `stage`."""
+    """Particles before their second-stage weights: moved from the belief `before`, some of them `lost` (N,).
+    `characteristic`: the point at which the look-ahead judged each particle of the belief; `residual`: its residual
+    there by channel; `stage`: the first stage."""
 
     particles: Any
     lost: Any
@@ -57,13 +58,13 @@ class LookedAhead(AbstractAhead):
         before, stage = self.before, self.stage
         logs, after = log_prob(model, row, self.particles)
         chosen_ahead = gather((stage.ahead,), stage.ancestors)[0]
-        # Of the particles before, of which a number that adapts may have left others than it takes.
+        # The number of particles before the step: with an adaptive number it may differ from that of this step.
         n = jnp.asarray(before.weights.shape[0], logs.dtype)
         drawn = logs - chosen_ahead + log_chosen(filter_, log_of(stage.weights), stage.ancestors)
         log_first = stage.log_mean
         oftener = chosen_ahead - (log_first + jnp.log(n))
         if stage.resampled is not None:
-            # Without a draw: an ordinary importance step from the weights that were there.
+            # Without a draw: an ordinary importance step from the weights before.
             drawn = jnp.where(stage.resampled, drawn, logs + log_of(before.weights) + jnp.log(n))
             log_first = jnp.where(stage.resampled, log_first, -jnp.log(n))
             oftener = jnp.where(stage.resampled, oftener, 0.0)
@@ -83,15 +84,16 @@ class LookedAhead(AbstractAhead):
 class AuxiliaryParticleFilter(AbstractParticleFilter):
     """The auxiliary particle filter (Pitt & Shephard 1999; Bao et al. 2015, eqs 8 to 11).
 
-    First-stage weights `w_{k-1} p(y_k | x_{k-1})` as far as `lookahead` knows it, ancestor draw, propagation, second-stage
-    weights `p(y_k | x_k) / p(y_k | x_{k-1} of the ancestor)` (erratum: the paper prints eq 11 otherwise, and its steps omit the
-    ancestor draw). The log-likelihood is right for any look-ahead, but its scatter is not, and with it its bias, which is low.
+    A step has first-stage weights `w_{k-1} p(y_k | x_{k-1})`, which `lookahead` approximates, a draw of ancestors,
+    propagation, and second-stage weights `p(y_k | x_k) / p(y_k | x_{k-1} of the ancestor)` (erratum: the paper prints
+    eq 11 otherwise, and its steps omit the ancestor draw). The likelihood is unbiased for any look-ahead. The scatter
+    of the log-likelihood, and with it its downward bias, depends on the look-ahead.
 
-    `lookahead`: `PredictiveLikelihood()`, which counts in the process noise, is the default where process and measurement noise
-    are Gaussian; `PointLookahead()` is the paper's, p(y_k | mu_k), sharp as the sensor is. For other noises the default is the
-    point with a share of ancestors that are drawn without looking ahead. Rows in which first and second stage disagree have
-    `info.remark = Result.lookahead_misled`, and `run` tells of them. Where the ESS of the first-stage weights stays above
-    `threshold`, no ancestors are drawn and the step is a bootstrap step.
+    `lookahead`: `PredictiveLikelihood()`, which includes the process noise, is the default where process and
+    measurement noise are Gaussian; `PointLookahead()` is the paper's, p(y_k | mu_k), as sharp as the sensor. For other
+    noises the default is `PointLookahead` with a share of ancestors that are drawn without looking ahead. Rows in which
+    the first and the second stage disagree have `info.remark = Result.lookahead_misled`, of which `run` warns. Where
+    the ESS of the first-stage weights stays above `threshold`, no ancestors are drawn and the step is a bootstrap step.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.particles
@@ -107,7 +109,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         if not isinstance(self.lookahead, AbstractLookahead | None):
             raise InputError(
                 f"lookahead = {self.lookahead!r}: must be PredictiveLikelihood(), PointLookahead() or None (what the model "
-                "allows). A function is given as PointLookahead(function)."
+                "allows). Give a function as PointLookahead(function)."
             )
 
     def check(self, model):
@@ -115,7 +117,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
             self.lookahead.check(model)
 
     def _start(self, model, row, key):
-        # Before the first row there is nothing to choose from.
+        # Before the first row there are no particles to choose from.
         return ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient)._start(model, row, key)
 
     def _predict(self, model, belief, row):
@@ -130,7 +132,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         log_weights = log_of(belief.weights)
         ahead = soften(ahead, log_weights, ~lost, lookahead.defensive)
         if self.gradient == "score":
-            # Its derivative is none of the likelihood's: what is gained in the choice is lost in the weights.
+            # Its derivative adds nothing to the likelihood's: the choice and the weights cancel.
             ahead = jax.lax.stop_gradient(ahead)
         first, log_first, alive = numerics.normalise(without(lost, ahead + log_weights))
         ancestors, resampled = choose_ancestors(self, draw, first)
@@ -145,7 +147,8 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
 
 
 def _scatter(model, residual, ahead):
-    """By channel, the variance that the step's noise makes: how far particles came from where their ancestors were to be."""
+    """By channel, the variance that the step's noise causes: the mean square distance of particles from the points at
+    which their ancestors were judged."""
     gone = {name: residual[name] - ahead[name] for name in model.channels}
     return {
         name: jnp.mean(jnp.square(numerics.wrap_angle(d) if name in model.angles else d)) for name, d in gone.items()

@@ -1,4 +1,4 @@
-"""Beliefs in files: stop, and go on with the same bits."""
+"""Beliefs in files, so that a run can stop and continue with the same bits."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from jaxveh.io import replacing_file
 from jaxveh.statespace import AbstractBelief
 
 STATES = "states"
-"""Where the file has their names: no path into a belief, which starts with a dot."""
+"""The file's entry for the names of the states. No path into a belief is called so: a path starts with a dot."""
 
 B = TypeVar("B", bound=AbstractBelief)
 
 
 def save_belief(path: str | Path, belief: AbstractBelief) -> Path:
-    """Write a belief to a NumPy archive (.npz): every array by its place in the belief, keys as their words.
+    """Write a belief to a NumPy archive (.npz): every array by its place in the belief, random keys as their integers.
 
-    `load_belief` reads it; steps from there are those of an unbroken run, bit for bit. An existing file is replaced only once
-    the new one is whole. Returns the path.
+    `load_belief` reads it; the steps that follow equal those of an unbroken run, bit for bit. An existing file is
+    replaced only when the new one is complete. Returns the path.
 
     **Raises** `InputError` for another suffix, or where the file cannot be written.
     """
@@ -40,9 +40,10 @@ def save_belief(path: str | Path, belief: AbstractBelief) -> Path:
 
 
 def load_belief(path: str | Path, like: B) -> B:
-    """Read a belief that `save_belief` wrote; `like` is one of the same filter and model, such as that after the first row.
+    """Read a belief that `save_belief` wrote; `like` is a belief of the same filter and model, such as the one after
+    the first row.
 
-    **Raises** `InputError` naming what the file has otherwise: another filter, number of particles, model or precision.
+    **Raises** `InputError` if the file is of another filter, number of particles, model or precision; it names the difference.
     """
     path = Path(path)
     if not path.is_file():
@@ -52,7 +53,7 @@ def load_belief(path: str | Path, like: B) -> B:
         with np.load(path) as archive:
             arrays = dict(archive)
     except (ValueError, OSError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: is no file that save_belief wrote ({error}).") from error
+        raise InputError(f"{path}: is not a file of save_belief ({error}).") from error
     states, own = tuple(map(str, arrays.pop(STATES, ()))), _states(like)
     if states != own:
         raise InputError(
@@ -75,7 +76,7 @@ def load_belief(path: str | Path, like: B) -> B:
 
 
 def _states(belief: Any) -> tuple[str, ...]:
-    """The names of the states, where the belief has a mean."""
+    """The names of the states, empty if the belief has no mean."""
     try:
         return eqx.filter_eval_shape(lambda belief: belief.mean, belief)._fields
     except InputError:

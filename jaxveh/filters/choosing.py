@@ -1,6 +1,6 @@
-"""How the next particles are chosen, and how that choice lets derivatives through: by a score, or by softened weights."""
+"""The choice of the next particles, and how derivatives pass through it: by a score, or by softened weights."""
 
-# No postponed annotations in this file: they would make fields of class variables.
+# No postponed annotations in this file: they would turn class variables into fields.
 
 import abc
 from collections.abc import Callable
@@ -19,11 +19,11 @@ from jaxveh.statespace import kit
 
 
 def score(log_probability):
-    """Zero, with all derivatives of a draw's log-probability: what makes gradients through a choice right.
+    """Zero, with all derivatives of a draw's log-probability: it makes gradients through a choice right.
 
-    A draw j of a category i of probability p_i counts with p_i over the same p_i without derivative, a factor of 1, so that the
-    expectation's derivative has the share that comes from choosing (A. Scibior & F. Wood, Differentiable particle filtering
-    without modifying the forward pass, 2021; G. Poyiadjis, A. Doucet & S. Singh 2011).
+    A draw j of a category i of probability p_i is weighted by p_i over the same p_i without derivative: a factor of 1 by which
+    the expectation's derivative includes the part that comes from choosing (A. Scibior & F. Wood, Differentiable particle
+    filtering without modifying the forward pass, 2021; G. Poyiadjis, A. Doucet & S. Singh 2011).
     """
     return derivative_alone(log_probability)
 
@@ -35,15 +35,15 @@ def log_of(weights):
 
 
 def gather(particles, ancestors):
-    """The ancestors' states; the draw itself is held fixed under differentiation."""
+    """The ancestors' states; no derivative passes the draw itself."""
     take = lambda field: field.at[ancestors].get(mode="promise_in_bounds", indices_are_sorted=True)
     return jax.tree.map(take, particles)
 
 
 class Resampled(NamedTuple):
-    """The next particles, (n,) in each field; which of those before each comes from, `ancestors` (n,) int32; the logarithms of
-    their weights over 1 / n, with the derivative of the choice, `log_weights` (n,); and the code of how they came about, if there
-    is anything to tell (`Result`)."""
+    """The next particles, (n,) in each field; the index of the particle from which each comes, `ancestors` (n,) int32;
+    the logarithms of their weights over 1 / n, with the derivative of the choice, `log_weights` (n,); and a `remark` on
+    the choice, a code of `Result`."""
 
     particles: Any
     ancestors: Any
@@ -52,14 +52,14 @@ class Resampled(NamedTuple):
 
 
 class AbstractResampling(eqx.Module):
-    """How the next particles are made of weighted ones.
+    """A scheme that makes the next particles of weighted ones.
 
-    What a scheme can is declared where it is true, and is *no* otherwise:
+    A scheme declares its properties, which are False by default:
 
-    - `keeps_ancestors`: each of the next particles is a copy of one before, its ancestor, drawn by the weights alone (`draw`, as
-      an `AbstractDraw` has it). Filters that choose ancestors before they move (`AuxiliaryParticleFilter`, `Guided`,
-      `Marginalised`), and smoothers that follow them (`Genealogy`, `FixedLag`), ask for it.
-    - `reweights`: the next particles have weights of their own, not all 1 / n.
+    - `keeps_ancestors`: each of the next particles is a copy of one before, its ancestor, drawn by the weights alone (`draw` of
+      `AbstractDraw`). It is required by filters that choose ancestors before they move (`AuxiliaryParticleFilter`, `Guided`,
+      `Marginalised`) and by smoothers that follow ancestors (`Genealogy`, `FixedLag`).
+    - `reweights`: the weights of the next particles are not all 1 / n.
     """
 
     keeps_ancestors: ClassVar[bool] = False
@@ -67,8 +67,8 @@ class AbstractResampling(eqx.Module):
 
     @abc.abstractmethod
     def resample(self, key, particles: Any, weights: Any, logs: Any, n: int, gradient: str) -> Resampled:
-        """The next `n` of particles (N,) with normalised `weights` (N,), whose logarithms are `logs`; `gradient` as filters have
-        it."""
+        """The next `n` particles, made of particles (N,) with normalised `weights` (N,), whose logarithms are `logs`;
+        `gradient` as in the filters."""
 
 
 class AbstractDraw(AbstractResampling):
@@ -78,11 +78,11 @@ class AbstractDraw(AbstractResampling):
 
     @abc.abstractmethod
     def draw(self, key, weights: Any, n: int) -> Any:
-        """Ancestors (n,) int32, nondecreasing, of weights (N,)."""
+        """Ancestors (n,) int32, nondecreasing, drawn by weights (N,)."""
 
     @abc.abstractmethod
     def split(self, logs: Any) -> tuple[Any, Any]:
-        """Of normalised log weights (N,): the log weights after the draw, over 1 / n, and the log-probabilities of the draw."""
+        """The log weights after the draw, over 1 / n, and the log-probabilities of the draw, for normalised log weights (N,)."""
 
     def resample(self, key, particles, weights, logs, n, gradient):
         ancestors = drawn_ancestors(self, key, weights, n)
@@ -91,7 +91,7 @@ class AbstractDraw(AbstractResampling):
 
 
 class PlainDraw(AbstractDraw):
-    """A draw by `scheme(key, weights, n) -> ancestors`, such as `numerics.systematic`; equal weights are left."""
+    """A draw by `scheme(key, weights, n) -> ancestors`, such as `numerics.systematic`; the weights after it are equal."""
 
     scheme: Callable = eqx.field(static=True, default=numerics.systematic)
 
@@ -105,9 +105,9 @@ class PlainDraw(AbstractDraw):
 class Soft(AbstractDraw):
     """A resampling scheme that draws from softened weights, `share` w + (1 - share) / N (P. Karkus, D. Hsu & W. Lee 2018).
 
-    Drawn particles keep the weight w over the softened one, through which derivatives pass; the log-likelihood stays right for
-    any share, only noisier. With `gradient="held"` the derivative of the draw itself is left out: a **bias** that falls with
-    the share (0: no choice at all, weights degenerate). With `gradient="score"` there is none.
+    A drawn particle has the weight w over the softened weight, through which derivatives pass. The log-likelihood is
+    right for any share, but noisier. With `gradient="held"` the derivative of the draw itself is left out: a **bias** that falls
+    with the share (with 0 there is no choice at all, and weights degenerate). With `gradient="score"` there is no bias.
     """
 
     reweights: ClassVar[bool] = True
@@ -126,23 +126,23 @@ class Soft(AbstractDraw):
 
 
 Scheme = AbstractResampling | Callable
-"""What a particle filter takes as its `resampling`."""
+"""The type of a particle filter's `resampling`."""
 
 
 def as_resampling(scheme: Scheme) -> AbstractResampling:
-    """The scheme; a function `(key, weights, n) -> ancestors` as a `PlainDraw`."""
+    """The scheme itself, or a `PlainDraw` of a function `(key, weights, n) -> ancestors`."""
     return scheme if isinstance(scheme, AbstractResampling) else PlainDraw(scheme)
 
 
 def drawn_ancestors(scheme: AbstractDraw, key, weights, n: int):
-    """Ancestors (n,) int32, which no derivative passes, kept for the backward pass."""
+    """Ancestors (n,) int32, without derivative, stored for the backward pass."""
     drawn = scheme.draw(key, jax.lax.stop_gradient(weights), n)
     return checkpoint_name(drawn.astype(jnp.int32), kit.KEPT)
 
 
 def log_weights_after(scheme: AbstractDraw, logs, ancestors, gradient: str):
-    """The log weights (n,), over 1 / n, of particles drawn from those of log weights `logs` (N,): zero unless the scheme
-    `reweights`. They carry the derivative of the choice unless it is `held`.
+    """The log weights (n,), over 1 / n, of particles drawn by the log weights `logs` (N,): zero unless the scheme
+    `reweights`. They carry the derivative of the choice unless `gradient` is "held".
     """
     after, chances = scheme.split(logs)
     after = after[ancestors]
@@ -165,14 +165,14 @@ def log_chosen(filter_, log_probabilities, ancestors):
 
 
 DRAW_INSTEAD = "Take numerics.systematic or Soft(...), or ParticleFilter, which takes any scheme."
-"""What a filter says that needs ancestors."""
+"""The advice in the error of a filter that needs ancestors."""
 
 
 def check_ancestors(who: str, scheme: Scheme, instead: str) -> None:
-    """Raise `InputError` for a scheme whose particles have no ancestors, which `who` needs, and say what to take `instead`."""
+    """Raise `InputError` if the scheme's particles have no ancestors, which `who` needs; `instead` is the advice."""
     scheme = as_resampling(scheme)
     if not scheme.keeps_ancestors:
         raise InputError(
-            f"{who}: particles of {type(scheme).__name__} have no ancestors: its class does not declare any (`keeps_ancestors`). "
+            f"{who}: particles of {type(scheme).__name__} have no ancestors: its class does not declare `keeps_ancestors`. "
             f"{instead}"
         )

@@ -1,4 +1,4 @@
-"""Measurements that come late, and rows that come out of their order."""
+"""Measurements that arrive late, and rows that arrive out of order."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from jaxveh.statespace import AbstractFilter, AbstractWrapper, Gradient, Info, R
 
 
 class DelayedBelief(AbstractTransparentBelief):
-    """The newest belief `inside`; the last rows in the order of their times, `rows` with (depth,) leaves, those that are `real`
-    (depth,), and the belief `base` before the first of them; `said`: the log-likelihood of all rows so far; `began`: the first
-    row's time."""
+    """The newest belief `inside`; the last `rows` in the order of their times, with (depth,) leaves; which of them are
+    `real` (depth,); the belief `base` before the first of them; `base_said` and `said`: the log-likelihood of all rows
+    up to `base` and up to now; `began`: the time of the first row."""
 
     inside: Any
     base: Any
@@ -31,16 +31,16 @@ class DelayedBelief(AbstractTransparentBelief):
 
 
 class Delayed(AbstractWrapper):
-    """Any `inner`, with measurements taken in the order of their own times, not of their arrival (Y. Bar-Shalom, X. Li & T.
-    Kirubarajan 2001, on out-of-sequence measurements: by going back and filtering anew, which is exact).
+    """Any filter `inner`, with measurements taken in the order of their own times, not of their arrival (Y. Bar-Shalom, X. Li &
+    T. Kirubarajan 2001, out-of-sequence measurements; the filter goes back and filters the rows again, which is exact).
 
-    `delays`: by channel, how long before the row's time its value was measured (s): `{"gnss_speed": 0.12}`. And `step` takes rows
-    with times before the newest one's. The last `depth` rows and late measurements are kept: what is older than these is left
-    out, with the result code `measurement_too_late`; a delayed value from before the first row is ignored.
+    `delays`: by channel, how long before the row's time its value was measured (s), such as `{"gnss_speed": 0.12}`. `step` also
+    takes rows that are older than the newest one. The last `depth` rows and late measurements are stored. A measurement older
+    than these is left out, with the result code `measurement_too_late`; a delayed value from before the first row is ignored.
 
-    A row in order costs two steps of the filter, one that is late `depth` of them. Its info has the log-likelihood that the
-    rows' arrival adds to the sum, and the innovations of the row's own values. Delayed values take the inputs of the row before
-    their time. Process noise must be continuous in time: an extra row in a step must not be an extra draw.
+    A row in order costs two steps of the filter, a late row `depth` steps. Its info has the change of the total
+    log-likelihood, and the innovations of the row's own values. A delayed value takes the inputs of the row before its
+    time. Process noise must be continuous in time: an extra row within a step must not add an extra draw.
     """
 
     inner: AbstractFilter
@@ -59,15 +59,15 @@ class Delayed(AbstractWrapper):
     def __check_init__(self):
         for name, delay in self.delays:
             check_positive(f"Delayed.delays of {name}", delay)
-        check_whole("Delayed.depth", self.depth, 1 + len(self.delays), "There must be one more than delays.")
+        check_whole("Delayed.depth", self.depth, 1 + len(self.delays), "It must be larger than the number of delays.")
 
     def check(self, model):
         check_names("Delayed.delays", [name for name, _ in self.delays], model.channels)
         noise = model.process_noise
         if noise is not None and not noise.grows_with_time:
             raise InputError(
-                "Delayed: a part of the process noise is a law a step (Discrete, or an input's white error), and a row put in "
-                "between would add it once more. It must be Continuous; give uncertain inputs a correlation time."
+                "Delayed: a part of the process noise is drawn once per step (Discrete, or an input's white error), and an extra "
+                "row would add it once more. It must be Continuous; give uncertain inputs a correlation time."
             )
         kit.check_rows_between("Delayed", self.inner)
         if model.input_path != "held":
@@ -103,7 +103,7 @@ class Delayed(AbstractWrapper):
         return inside, before.said + info.log_likelihood, _bare(info)
 
     def _anew(self, model, before, belief, row) -> tuple[Any, Any, Info]:
-        """From the base through all rows that are kept."""
+        """Filter all stored rows again, from the base."""
 
         def forward(carry, given):
             inside, said = carry
@@ -120,13 +120,13 @@ class Delayed(AbstractWrapper):
         return inside, said, _merge_info(every_info, real, new)
 
     def _prompt(self, row: Row) -> Row:
-        """The row without what is delayed."""
+        """The row without its delayed values."""
         late = {name for name, _ in self.delays}
         kept = {n: jnp.full_like(v, jnp.nan) if n in late else v for n, v in row.y._asdict().items()}
         return row._replace(y=type(row.y)(**kept))
 
     def _late(self, belief: DelayedBelief, row: Row, name: str, delay: float) -> tuple[Row, Any]:
-        """The delayed value of a channel as a row of its own time, and whether there is one."""
+        """The delayed value of a channel as a row at its own time, and whether there is one."""
         kept = {n: v if n == name else jnp.full_like(v, jnp.nan) for n, v in row.y._asdict().items()}
         t = row.t - delay
         earlier = belief.real & (belief.rows.t <= t)
@@ -137,8 +137,9 @@ class Delayed(AbstractWrapper):
         return Row(t, u, type(row.y)(**kept)), ~jnp.isnan(getattr(row.y, name))
 
     def _with_rows(self, model: StateSpace, belief: DelayedBelief, piece: Row, real) -> DelayedBelief:
-        """The belief with the piece among its rows; the oldest of them goes into the base."""
-        # What is not real is filtered and thrown away: a step back in time would have no derivative.
+        """The belief with `piece` inserted among its rows; the oldest row goes into the base."""
+        # A row that is not real is filtered, too, and thrown away. Its time is that of the base: a step back in time
+        # would have no derivative.
         piece = piece._replace(t=jnp.where(real, piece.t, belief.base.t))
         longer = lambda rows, one: jnp.concatenate([rows, one[None]])
         rows, reals = jax.tree.map(longer, (belief.rows, belief.real), (piece, real))
@@ -156,7 +157,7 @@ class Delayed(AbstractWrapper):
 
 
 def _bare(info: Info) -> Info:
-    """Without what has no meaning for several rows at once."""
+    """The info without the fields that have no meaning for several rows at once."""
     return info._replace(whitened=None, log_scale=None)
 
 
@@ -188,6 +189,6 @@ def _merge_info(every_info: Info, real: Any, new: Any) -> Info:
 
 
 def _first(codes: Any, real: Any) -> Any:
-    """The first of the codes (T,) that is not zero, of real rows; zero without one."""
+    """The first non-zero code of the real rows' codes (T,); zero if there is none."""
     told = real & (codes != 0)
     return jnp.where(jnp.any(told), codes[jnp.argmax(told)], code(Result.successful))

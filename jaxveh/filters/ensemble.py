@@ -30,17 +30,17 @@ class EnsembleBelief(AbstractBelief):
 
     @property
     def mean(self):
-        """The members' mean of each field."""
+        """The mean of each field over the members."""
         return jax.tree.map(jnp.mean, self.members)
 
     @property
     def std(self):
-        """The members' standard deviation of each field (over N - 1)."""
+        """The standard deviation of each field over the members (divided by N - 1)."""
         return jax.tree.map(_std, self.members)
 
     @property
     def covariance(self):
-        """(n, n) over N - 1, in the order of the state's fields."""
+        """The covariance (n, n) (divided by N - 1), in the order of the state's fields."""
         deviations = _deviations(jnp.stack(self.members))
         return times(deviations, deviations.T)
 
@@ -57,13 +57,14 @@ class EnsembleBelief(AbstractBelief):
 class Ensemble(AbstractTwoPartFilter):
     """The ensemble Kalman filter of `members` samples (G. Evensen 1994; G. Burgers, P. van Leeuwen & G. Evensen 1998).
 
-    Every member is propagated with a draw of the process noise and moved by the gain of the ensemble's own covariances towards
-    the measurement. `perturbed`: each towards a measurement with a draw of its noise; otherwise, by the deterministic update
-    of J. Whitaker & T. Hamill (2002), the mean by the gain and the deviations by a smaller one, without that sampling error.
-    With M channels the gain has errors of about sqrt(M / members), so that it is exact only in the limit.
+    Every member is propagated with a draw of the process noise and then moved towards the measurement by the gain of
+    the ensemble's own covariances. `perturbed=True`: each member moves towards the measurement plus a draw of its
+    noise. Otherwise the update is deterministic (J. Whitaker & T. Hamill 2002): the mean moves by the gain and the
+    deviations by a smaller one, without that sampling error. With M channels the gain has errors of about
+    sqrt(M / members), so that it is exact only in the limit.
 
-    Noises must have covariances; of one that depends on the state that at the members' mean counts. Its gradients are right:
-    nothing is drawn from weights.
+    Noises must have covariances; a measurement noise that depends on the state is taken at the members' mean. The
+    gradients are exact, as no member is drawn by weights.
     """
 
     whitens: ClassVar[bool] = True
@@ -104,7 +105,7 @@ class Ensemble(AbstractTwoPartFilter):
     def _propagate(self, model, belief, t, u_next):
         u = model.step_inputs(belief.t, t, belief.u, u_next)
         moved = model.transition(belief.t, t, belief.members, u)
-        # Another key each time: between two rows there may be several predictions.
+        # A new key for each prediction: there may be several between two rows.
         draw, key = jax.random.split(jax.random.fold_in(belief.key, belief.count))
         moved = numerics.fence(add_noise(model, draw, moved, t - belief.t))
         return EnsembleBelief(moved, key, t, belief.u, belief.count)

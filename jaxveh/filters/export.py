@@ -20,18 +20,18 @@ NUMBERS = ("log_likelihood", "nis", "ess", "result")
 
 
 def export_filter(folder: str | Path, filter: AbstractFilter, model: StateSpace, *, key=None) -> Path:
-    """Write `init.jaxexport`, `step.jaxexport` and `names.json` into a new `folder`; returns it.
+    """Write `init.jaxexport`, `step.jaxexport` and `names.json` into a new `folder`, and return it.
 
-    Who uses them needs jax alone (of a version near this one; see `jax.export`), on the platform that is the default here:
+    To use them, jax alone is needed (of a version near this one; see `jax.export`), on the platform that is the default here:
 
         init, step = (jax.export.deserialize(bytearray(open(f"{name}.jaxexport", "rb").read())) for name in ("init", "step"))
         state, *shown = init.call(t, u, y)
         state, *shown = step.call(state, t, u, y)
 
-    `t` is a scalar, `u` (k,) and `y` (m,) arrays in the order that `names.json` gives, y NaN where missing, all in the
-    precision of the model. `state` is a tuple of arrays, to be handed on as it is. `shown`: mean and standard deviation of the
-    report (r,), and `numbers` (4,): log-likelihood, NIS, ESS, result code. The model's parameters, and the `key` of a particle
-    filter, are constants in the programs. With x64 arrays, jax_enable_x64 must be on there, too.
+    `t` is a scalar, `u` (k,) and `y` (m,) arrays in the order of `names.json`, y NaN where missing, all in the precision of the
+    model. `state` is a tuple of arrays, to be passed on unchanged. `shown`: mean and standard deviation of the report (r,), and
+    `numbers` (4,): log-likelihood, NIS, ESS, result code. The model's parameters, and the `key` of a particle filter, are
+    constants in the programs. With x64 arrays, jax_enable_x64 must be on there, too.
 
     **Raises** `InputError` where the folder exists already or cannot be written, and as `filter.check`.
     """
@@ -86,7 +86,7 @@ def _row(model: StateSpace, t, u, y) -> Row:
 
 
 def _kind(leaf: Any) -> Any:
-    """The generator of a key, None of an array."""
+    """The generator of a key; None for an array."""
     return jax.random.key_impl(leaf) if jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key) else None
 
 

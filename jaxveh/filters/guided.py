@@ -1,4 +1,4 @@
-"""The guided particle filter: particles move to where the measurement says they should be."""
+"""The guided particle filter: particles are drawn where the measurement is likely."""
 
 from __future__ import annotations
 
@@ -38,12 +38,13 @@ from jaxveh.statespace import Smoothing, StateSpace, kit
 RULES = ("extended", "unscented")
 
 UNGUIDED = 0.1
-"""The share of the first particles that the prior alone draws, so that no weight is more than ten times the likelihood."""
+"""The share of the first particles that are drawn from the prior alone, so that no weight exceeds ten times the likelihood."""
 
 
 class Proposal(NamedTuple):
-    """From where a particle's noise is drawn: N(mean, F F^T) with `mean` (q,), `factor` F (q, q); `log_ahead`, how likely the
-    measurement is from this particle; `variances` (m,) that the noise gives the channels."""
+    """The distribution from which a particle's noise is drawn, N(mean, F F^T), with `mean` (q,) and `factor` F (q, q);
+    `log_ahead`: the log-likelihood of the measurement given the particle; `variances` (m,): those of the channels that
+    the noise causes."""
 
     mean: Any
     factor: Any
@@ -52,8 +53,8 @@ class Proposal(NamedTuple):
 
 
 class FirstGuided(AbstractAhead):
-    """The first particles, some of them `astray` (N,); how much oftener each was drawn than by the prior, `log_drawn` (N,); those
-    that the prior alone would have drawn, `unmeasured`; and the filter's `key`."""
+    """The first particles, some of them `astray` (N,); `log_drawn` (N,): the log-density of their draw less that of the
+    prior; `unmeasured`: the particles that the prior alone gives; and the filter's `key`."""
 
     particles: Any
     astray: Any
@@ -75,8 +76,8 @@ class FirstGuided(AbstractAhead):
 
 
 class Proposed(AbstractAhead):
-    """Particles that wait for their weights: drawn from their proposals, some of them `astray` (N,), with log p(e) / q(e) in
-    `ratio` (N,); the belief `before`, where the transition took its particles (`moved`), which of these it `lost`, the
+    """Particles before their weights: drawn from their proposals, some of them `astray` (N,), with log p(e) / q(e) in
+    `ratio` (N,); the belief `before`, its particles after the transition (`moved`), which of these are `lost`, the
     `variances` (N, m) of their proposals, and the first `stage`."""
 
     particles: Any
@@ -123,17 +124,18 @@ class Guided(AbstractParticleFilter):
 
         w_{k-1} p(y | x) p(e) / q(e)
 
-    The first particles are drawn given the first measurement in the same way, from the prior where that is Gaussian, but for a
-    tenth of them that are the prior's own.
+    If the prior is Gaussian, nine tenths of the first particles are drawn given the first measurement in the same way,
+    and a tenth from the prior itself.
 
-    `auxiliary`: ancestors are chosen by what each predicts of the measurement, too; with a linear observation this is the fully
-    adapted filter (M. Pitt & N. Shephard 1999), whose weights are all equal (measurement noise that depends on the state is
-    taken for the proposal where the particle is without its noise). It pays where the measurement is sharper than the
-    process noise; each particle costs a small Kalman update. **Where the observation is nonlinear over the process noise, do not
-    choose it**: with `"extended"` it loses what the slope does not see, and the effective sample size says nothing of it, for it
-    rises (one recording of the growth model, 40 rows, 1000 particles: log-likelihood 1.5 too low, scattered by 1.9, the ESS
-    700; without `auxiliary` 0.6, 0.8 and 550). Rows of which the particles themselves show it have
-    `info.remark = Result.lookahead_misled`. The process noise must be Gaussian, and measurement noise have a covariance.
+    `auxiliary`: ancestors are chosen by their weights and by how well each predicts the measurement. With a linear observation
+    this is the fully adapted filter (M. Pitt & N. Shephard 1999), whose weights are all equal. (For the proposal, measurement
+    noise that depends on the state is taken at the particle without process noise.) It pays where the measurement is sharper
+    than the process noise; each particle costs a small Kalman update. **Where the observation is nonlinear over the process
+    noise, do not use it**: with `"extended"` it loses particles that the linearisation does not foresee, and the effective
+    sample size does not show this, as it rises (one recording of the growth model, 40 rows, 1000 particles: log-likelihood 1.5
+    too low, standard deviation 1.9, ESS 700; without `auxiliary` 0.6, 0.8 and 550). Rows whose weights show it have
+    `info.remark = Result.lookahead_misled`. The process noise must be Gaussian, and the measurement noise must have a
+    covariance.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.particles
@@ -151,7 +153,7 @@ class Guided(AbstractParticleFilter):
 
     def check(self, model):
         if model.process_noise is None:
-            raise InputError("Guided: the model has no process noise, which is what it guides. Use ParticleFilter.")
+            raise InputError("Guided: the model has no process noise, which this filter guides. Use ParticleFilter.")
         check_covariances("Guided", model)
         check_gaussian("Guided", "process noise", model.process_noise.law)
 
@@ -183,7 +185,7 @@ class Guided(AbstractParticleFilter):
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         moved = model.transition(belief.t, row.t, belief.particles, u)
         moved, lost = replace_lost(moved, belief.particles)
-        assert model.process_noise is not None  # `check` has seen to it
+        assert model.process_noise is not None  # `check` ensures it
         law = model.process_noise.over(jnp.maximum(row.t - belief.t, SHORTEST))
         covariance = law.covariance()
         prior = Spread(numerics.cholesky(covariance), covariance)
@@ -198,7 +200,7 @@ class Guided(AbstractParticleFilter):
         white = numerics.normal(noise, (len(law.names), self.particles), logs.dtype)
         e = chosen.mean.T + jnp.einsum("iqr,ri->qi", chosen.factor, white)
         x = _add_to_states(start, law.names, e)
-        # A proposal, too, may have no value.
+        # A draw from a proposal, too, can give a particle that is not finite.
         x, astray = replace_lost(x, start)
         ratio = _log_normal(numerics.solve_lower(prior.factor, e), prior.factor) - _log_normal(white, chosen.factor)
         stage = FirstStage(proposals.log_ahead, first, log_first, ancestors, resampled, alive)
@@ -215,7 +217,7 @@ def _rule_of(name: str, count: int) -> AbstractRule:
 
 
 def _proposal(model: StateSpace, rule: AbstractRule, row, moved, names, prior: Spread) -> Proposal:
-    """The proposal of one particle that the transition took to `moved`, for the noise on `names`."""
+    """The proposal for the noise on `names` of one particle, which is `moved` after the transition."""
     measured, present = kit.presence(model, row)
     here = jnp.stack([present[name] for name in model.channels])
 
@@ -238,5 +240,5 @@ def _proposal(model: StateSpace, rule: AbstractRule, row, moved, names, prior: S
 
 
 def _log_normal(white, factor):
-    """Log-density (N,) of draws whose whitened values are `white` (q, N), less the part that a dimension makes."""
+    """Log-density (N,) of draws whose whitened values are `white` (q, N), without the constant -q log(2 pi) / 2."""
     return -0.5 * (jnp.sum(jnp.square(white), axis=0) + numerics.log_det(factor))

@@ -1,4 +1,4 @@
-"""Several filters that take turns on the same rows, each believing what the others said last."""
+"""Several filters that take turns on the same rows, each with the last results of the others."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from jaxveh.statespace import AbstractFilter, Row, StateSpace
 class Turn(NamedTuple):
     """One of several filters that exchange results.
 
-    `filter` and `model`; `listen(told)`: the system of the model, a car for example, of what is told; `tell(belief, row,
-    told)`: what is told after its step, `told` with its own part in it. `told` is a pytree of the caller's, its leaves arrays.
+    `told`: the values that the filters exchange, a pytree of arrays that the caller defines. `filter` and `model`: the
+    filter and its model; `listen(told)` returns the system of the model, such as a car, for these values;
+    `tell(belief, row, told)` returns `told` with this filter's own results inserted after its step.
     """
 
     filter: AbstractFilter
@@ -29,9 +30,10 @@ class Turn(NamedTuple):
 
 
 class Interleaved(NamedTuple):
-    """What filters that took turns made of a recording: by the turns' names `mean` and `std`, NamedTuples of each model's report
-    with (T,) in each field; `kept`, what was asked for; `told` after each row, leaves (T, ...); `result` and `failed_at`, the
-    first failing code (`jaxveh.Result`) of each and its row, 0 and -1 where all went well."""
+    """Estimates of filters that took turns on a recording. By the names of the turns: `mean` and `std`, NamedTuples of
+    each model's report with (T,) in each field; `kept`, the values of `keep`; `result` and `failed_at`, the first
+    failing code (`jaxveh.Result`) of each filter and its row, 0 and -1 if none failed. `told`: the exchanged values
+    after each row, leaves (T, ...)."""
 
     mean: dict[str, Any]
     std: dict[str, Any]
@@ -49,7 +51,7 @@ def interleave(
     key: Any = None,
     keep: Callable[[Any], Any] | None = None,
 ) -> Interleaved:
-    """Run filters side by side in one `lax.scan`; in each row all see what was told after the row before.
+    """Run several filters in one `lax.scan`; in each row all of them use the values `told` after the row before.
 
         turns = {
             "state": Turn(Cubature(), states, lambda told: told["car"], lambda belief, row, told: told | {"v": belief.mean.v_y}),
@@ -58,17 +60,17 @@ def interleave(
         found = interleave(turns, recording, {"car": car, "v": 0.0})
         found.mean["mass"].mass
 
-    Three small filters cost less than one of all states, and each can be written, tuned and switched off by itself (paper 002).
-    The price: what the others say is taken for certain, so that spreads come out too small, and what two states say of each
-    other is lost. The joint filter (`statespace.with_parameters`) is better wherever it is stable; `Consider` and `Dual` lie
-    between.
+    Three small filters cost less than one with all states, and each can be written, tuned and switched off by itself
+    (paper 002). In return, each filter takes the results of the others as exact, so that standard deviations are too
+    small, and correlations between states of different filters are lost. The joint filter
+    (`statespace.with_parameters`) is better wherever it is stable; `Consider` and `Dual` lie between the two.
 
-    **Arguments**: `turns` by name; `recording`: of which each model takes its own inputs and channels, or `Row`s that all take;
-    `told`: what is known before the first row; `key`: for particle filters; `keep(belief)`: further values of each row.
-    Everything can be jitted, batched and differentiated; steps are checkpointed.
+    **Arguments**: `turns` by name; `recording`: each model takes its own inputs and channels from it; or `Row`s that
+    all models take; `told`: the exchanged values before the first row; `key`: for particle filters; `keep(belief)`:
+    further values to keep of each row. Everything can be jitted, batched and differentiated; steps are checkpointed.
 
-    **Raises** `InputError` where a filter, its model and the recording do not go together, and where what is told after a row has
-    not the structure, shapes and dtypes of what was told before it.
+    **Raises** `InputError` where a filter, its model and the recording do not agree, and where `told` changes its
+    structure, shapes or dtypes in a row.
     """
     _check_turns(turns)
     rows = {
@@ -83,7 +85,7 @@ def interleave(
 
 
 def _scan(turns: Mapping[str, Turn], told: Any, rows: dict[str, Row], keys: dict[str, Any], keep: Callable | None):
-    """Means, spreads, what was kept and codes by the turns' names, and what was told, of all rows."""
+    """By the turns' names, the means, standard deviations, kept values and codes of all rows; and `told` of all rows."""
     at = lambda place: jax.tree.map(lambda leaf: leaf[place], rows)
 
     def after(stepped: dict, told: Any, row: dict) -> tuple[Any, Any, Any]:

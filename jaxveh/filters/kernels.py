@@ -1,4 +1,4 @@
-"""Particles smeared by a kernel, so that what carries no noise does not degenerate."""
+"""Particles smeared by a kernel, so that states without process noise do not degenerate."""
 
 import abc
 from typing import Any, ClassVar
@@ -14,13 +14,13 @@ from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, chec
 from jaxveh.statespace import AbstractTwoPartWrapper, StateSpace
 
 KERNEL = 0x6B65726E
-"""Folded into the step's key for the kernel's draws, so that they are none of the filter's."""
+"""Folded into the step's key for the kernel's draws, so that they differ from the filter's own draws."""
 
 
 class AbstractKernel(AbstractTwoPartWrapper):
-    """A particle filter whose particles are replaced, before each step, by draws from kernels about them."""
+    """A particle filter whose particles are replaced, before each step, by draws from kernels around them."""
 
-    # No postponed annotations in this file: they would make fields of these.
+    # No postponed annotations in this file: they would turn these into fields.
     has_covariance: ClassVar[bool] = True
     noise_by_row: ClassVar[bool] = True
     inner: eqx.AbstractVar[AbstractParticleFilter]
@@ -34,7 +34,8 @@ class AbstractKernel(AbstractTwoPartWrapper):
 
     @abc.abstractmethod
     def kernel(self, dimension: int) -> tuple[float, float]:
-        """How far each particle keeps its distance from the mean, and the kernel's spread over the particles'."""
+        """The factor on each particle's distance from the mean, and the kernel's standard deviation over that of the
+        particles."""
 
     def _predict(self, model, belief, row):
         names = self.smeared_states(model)
@@ -54,14 +55,14 @@ class AbstractKernel(AbstractTwoPartWrapper):
 
 
 class LiuWest(AbstractKernel):
-    """`inner` with parameters drawn from a mixture of kernels about them, shrunk so that mean and covariance stay.
+    """`inner` with parameters drawn from a mixture of kernels around them, shrunk so that mean and covariance stay the same.
 
         theta <- a theta_i + (1 - a) mean + N(0, (1 - a^2) V),    a = (3 discount - 1) / (2 discount)
 
-    (J. Liu & M. West 2001, around any particle filter. Theirs is an auxiliary filter that looks ahead with the shrunk parameters
-    and draws after its choice; here `AuxiliaryParticleFilter` looks ahead with the drawn ones.) `names`: the states that are
-    parameters, by default those without process noise. Their posterior is smeared with each step, and no time is long enough
-    for it to become sharp: compare discounts.
+    (J. Liu & M. West 2001, here around any particle filter. Theirs is an auxiliary filter that looks ahead with the
+    shrunk parameters and draws from the kernels after it has chosen ancestors; here `AuxiliaryParticleFilter` looks
+    ahead with the drawn parameters.) `names`: the states that are parameters, by default those without process noise.
+    Their posterior is smeared in each step, so that it never becomes sharp, however long the recording: compare discounts.
     """
 
     rows_between: ClassVar[bool] = True
@@ -90,11 +91,11 @@ class LiuWest(AbstractKernel):
 
 
 class Regularised(AbstractKernel):
-    """`inner` whose particles are drawn from Gaussian kernels about them (C. Musso, N. Oudjane & F. Le Gland 2001).
+    """`inner` whose particles are drawn from Gaussian kernels around them (C. Musso, N. Oudjane & F. Le Gland 2001).
 
-    `bandwidth`: the kernel's spread over the particles'; None: the best for a Gaussian of n states and N particles,
-    (4 / (n + 2))^(1 / (n + 4)) N^(-1 / (n + 4)), times `share`. Nothing is shrunk, so that covariances grow by the bandwidth's
-    square in each step.
+    `bandwidth`: the kernel's standard deviation over that of the particles; None: the best value for a Gaussian of n
+    states and N particles, (4 / (n + 2))^(1 / (n + 4)) N^(-1 / (n + 4)), times `share`. Particles are not shrunk
+    towards the mean, so that covariances grow by the factor 1 + bandwidth^2 in each step.
     """
 
     inner: AbstractParticleFilter

@@ -1,4 +1,4 @@
-"""What those who add a filter or a wrapper build with: the contract, the families' bases, and their tools."""
+"""The parts for adding a filter or a wrapper: the contract, the base classes of the families, and their tools."""
 
 from jaxveh.filters.choosing import (
     AbstractDraw,

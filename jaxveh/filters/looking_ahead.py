@@ -1,4 +1,4 @@
-"""How an auxiliary particle filter judges particles by the next measurement, before they have moved."""
+"""Look-aheads of an auxiliary particle filter: the likelihood of the next measurement before particles have moved."""
 
 import abc
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from jaxveh.filters.particle import log_prob
 from jaxveh.statespace import AbstractNoise, Gaussian, StateDependent, StateSpace, kit
 
 MISLED = 0.5
-"""Below this share of the effective sample size that a choice by the weights alone would have left, looking ahead misled."""
+"""The look-ahead misled if the effective sample size is below this share of the one that a choice by the weights alone gives."""
 
 
 def _check_defensive(lookahead) -> None:
@@ -29,41 +29,42 @@ def _check_defensive(lookahead) -> None:
 
 
 class AbstractLookahead(eqx.Module):
-    """The first stage of an `AuxiliaryParticleFilter`: p(y_k | x_{k-1}), as far as one can know it before the draw.
+    """The first stage of an `AuxiliaryParticleFilter`: an approximation of p(y_k | x_{k-1}) before the draw.
 
     `defensive`: the share of ancestors that are drawn by their weights alone (T. Hesterberg 1995, a defensive mixture), so that
-    no second-stage weight exceeds the likelihood by more than 1 / share, however wrong the look-ahead is.
+    no second-stage weight exceeds the likelihood by more than a factor of 1 / share, however wrong the look-ahead is.
     """
 
-    # No postponed annotations in this file: they would make a field of it.
+    # No postponed annotations in this file: they would turn this into a field.
     defensive: eqx.AbstractVar[float]
 
     @abc.abstractmethod
     def check(self, model: StateSpace) -> None:
-        """Raise `InputError` where the model has not what this needs."""
+        """Raise `InputError` if the model does not meet this look-ahead's needs."""
 
     @abc.abstractmethod
     def log_prob(self, model: StateSpace, row, ahead, dt) -> tuple[Any, dict]:
-        """Of particles `ahead` ((N,) in each field), about log p(y | x_{k-1}) (N,), and the residuals there by channel."""
+        """For particles `ahead` ((N,) in each field), approximately log p(y | x_{k-1}) (N,), and the residuals there by
+        channel."""
 
     def propagate(self, model: StateSpace, t0, t1, x, u) -> Any:
-        """Where each particle of the state `x` (N,) is judged: its transition without noise."""
+        """The point at which each particle of the state `x` (N,) is judged: its transition without noise."""
         return model.transition(t0, t1, x, u)
 
     @property
     def moves_by_transition(self) -> bool:
-        """Whether `propagate` is the transition, which then is not computed twice."""
+        """Whether `propagate` is the transition, which is then computed only once."""
         return True
 
 
 class PredictiveLikelihood(AbstractLookahead):
     """The likelihood of the next measurement given the particle, its process noise included: N(y; h(mu), H Q H^T + R).
 
-    mu is the transition without noise and H the observation's slope there by the fields that carry noise (forward mode, one
-    derivative a field). Exact for a linear observation (M. Pitt & N. Shephard 1999, sec. 3.2), and never sharper than what
-    the noise leaves of it; the second stage only corrects what the slope leaves out. Where the observation is so nonlinear that
-    the slope leaves out much (a square at its foot), the `defensive` ancestors keep the filter near the bootstrap filter.
-    Process and measurement noise must be Gaussian; measurement noise that depends on the state counts as it is at mu.
+    mu is the transition without noise and H the observation's slope there with respect to the fields with noise (forward mode,
+    one derivative per field). It is exact for a linear observation (M. Pitt & N. Shephard 1999, sec. 3.2), and never sharper
+    than the process noise allows; the second stage only corrects the error of the linearisation. Where the observation is so
+    nonlinear that this error is large (such as a square at zero), the `defensive` ancestors keep the filter near the bootstrap
+    filter. Process and measurement noise must be Gaussian; measurement noise that depends on the state is taken at mu.
     """
 
     defensive: float = eqx.field(static=True, default=0.3)
@@ -94,12 +95,12 @@ class PredictiveLikelihood(AbstractLookahead):
 
 
 class PointLookahead(AbstractLookahead):
-    """The likelihood p(y_k | mu_k) at one point of each particle's future, as the papers print it (Pitt & Shephard 1999, eq. 8).
+    """The likelihood p(y_k | mu_k) at one point of each particle's prediction, as in the papers (Pitt & Shephard 1999, eq. 8).
 
-    `characteristic(model, t0, t1, x, u) -> mu`, elementwise, is that point; None: the transition without noise. It takes the
-    point for certain: **where sensors are sharper than the process noise moves the particles, it chooses a few ancestors that
-    happen to come near, and the likelihood is far too low** (sensors of a fifth of a step's noise, 1000 particles: by one
-    unit of its logarithm a row). `defensive` bounds the harm.
+    `characteristic(model, t0, t1, x, u) -> mu`, elementwise, is that point; None: the transition without noise. It
+    takes the point as exact: **where the measurement noise is smaller than the effect of the process noise, it chooses
+    the few ancestors whose points happen to be near, and the likelihood is far too low** (measurement noise a fifth of
+    a step's process noise, 1000 particles: log-likelihood one unit per row too low). `defensive` bounds the harm.
     """
 
     characteristic: Callable | None = eqx.field(static=True, default=None)
@@ -129,14 +130,14 @@ WITHOUT_SLOPES = PointLookahead(defensive=0.5)
 
 
 def lookahead_for(model: StateSpace) -> AbstractLookahead:
-    """What looks ahead where nothing is asked for: with the process noise where both noises are Gaussian."""
+    """The default look-ahead: with the process noise if both noises are Gaussian."""
     if model.process_noise is not None and model.process_noise.law.is_gaussian and kind_of_law(model).is_gaussian:
         return PredictiveLikelihood()
     return WITHOUT_SLOPES
 
 
 def soften(ahead: Any, log_weights: Any, alive: Any, share: float) -> Any:
-    """Log look-ahead (N,) of which a `share` of ancestors knows nothing: log(share + (1 - share) ahead / mean ahead)."""
+    """The log look-ahead (N,) where a `share` of ancestors is drawn without it: log(share + (1 - share) ahead / mean ahead)."""
     if share == 0:
         return ahead
     _, log_mean, some = numerics.normalise(jnp.where(alive, ahead + log_weights, -jnp.inf))
@@ -146,11 +147,11 @@ def soften(ahead: Any, log_weights: Any, alive: Any, share: float) -> Any:
 
 
 def remark_of(weights: Any, log_drawn: Any) -> Any:
-    """Whether looking ahead misled: `Result.lookahead_misled` or zero.
+    """`Result.lookahead_misled` if the look-ahead misled, otherwise zero.
 
-    With v the second-stage weights and `log_drawn` how much more often each ancestor was drawn than by its weight alone, the
-    effective sample size over the one without looking ahead is about sum v^2 drawn / sum v^2, both of the same particles:
-    low where the heavy ones come from ancestors that had been thought little of.
+    With v the second-stage weights and `log_drawn` the logarithm of how much more often each ancestor was drawn than by its
+    weight alone, the effective sample size over the one without look-ahead is about sum v^2 drawn / sum v^2, both of the same
+    particles. It is low where the heavy particles come from ancestors that the look-ahead had judged unlikely.
     """
     weights, drawn = jax.lax.stop_gradient((weights, jnp.exp(jnp.minimum(log_drawn, 50.0))))
     squared = jnp.square(weights)
@@ -159,9 +160,9 @@ def remark_of(weights: Any, log_drawn: Any) -> Any:
 
 
 def noises(model: StateSpace, row, particles, dt: Any) -> tuple[AbstractNoise, Any]:
-    """The law of the process noise over `dt`, and the covariance of the measurement noise by channel: (m, m), or (m, m, N) where
-    it depends on the particles' states."""
-    assert model.process_noise is not None  # `PredictiveLikelihood.check` has seen to it
+    """The law of the process noise over `dt`, and the covariance of the measurement noise by channel: (m, m), or
+    (m, m, N) if it depends on the particles' states."""
+    assert model.process_noise is not None  # `PredictiveLikelihood.check` ensures it
     process = model.process_noise.over(dt)
     if not isinstance(model.measurement_noise, StateDependent):
         return process, model.measurement_noise.covariance()
@@ -175,7 +176,8 @@ def noises(model: StateSpace, row, particles, dt: Any) -> tuple[AbstractNoise, A
 
 
 def slopes_of(model: StateSpace, row, particles, names: tuple[str, ...]) -> tuple[list, list]:
-    """What the particles show, (N,) by channel, and its slopes by the states `names`: by channel, by state (N,)."""
+    """The observation of the particles, (N,) by channel, and its slopes with respect to the states `names`, (N,) by
+    channel and state."""
     n = particles[0].shape[0]
 
     def see(x):
@@ -189,7 +191,7 @@ def slopes_of(model: StateSpace, row, particles, names: tuple[str, ...]) -> tupl
 
 
 def _image(law: AbstractNoise, slopes: list) -> list[list]:
-    """H Q H^T, by rows up to the diagonal, each entry (N,)."""
+    """H Q H^T, as rows up to the diagonal, each entry (N,)."""
     if all(isinstance(part, Gaussian) for part in law.parts):
         variances = [jnp.square(std) for part in law.parts for std in part.std]
         weighted = [[v * slope for v, slope in zip(variances, of, strict=True)] for of in slopes]
@@ -200,13 +202,13 @@ def _image(law: AbstractNoise, slopes: list) -> list[list]:
 
 
 def _marginal(image: list[list], R: Any, here: list) -> list[list]:
-    """image + R of the channels `here`; those absent are independent numbers of unit variance."""
+    """image + R of the channels `here`; absent channels are independent and of unit variance."""
     entry = lambda i, j: jnp.where(here[i] & here[j], image[i][j] + R[i, j], 1.0 if i == j else 0.0)
     return [[entry(i, j) for j in range(i + 1)] for i in range(len(here))]
 
 
 def _log_normal(lower: list[list], residual: list) -> Any:
-    """-(r^T S^-1 r + log det S) / 2 (N,), for S by rows up to the diagonal: S = L D L^T, written out elementwise."""
+    """-(r^T S^-1 r + log det S) / 2 (N,), for S as rows up to the diagonal: S = L D L^T, written out elementwise."""
     unit: list[list] = []  # rows of L left of the diagonal
     pivots: list = []
     white: list = []

@@ -1,4 +1,5 @@
-"""The Rao-Blackwellised particle filter: what is linear given the rest is left to a Kalman filter for each particle."""
+"""The Rao-Blackwellised particle filter: states that are linear given the others are estimated by one Kalman filter per
+particle."""
 
 from __future__ import annotations
 
@@ -35,7 +36,7 @@ from jaxveh.statespace import AbstractBelief, StateSpace, kit
 class MarginalisedBelief(AbstractBelief):
     """Weighted particles, each with a Gaussian over the linear states.
 
-    `particles`: the state's NamedTuple with (N,) in each field, of the linear states the conditional means; `covariances`
+    `particles`: the state's NamedTuple with (N,) in each field, the conditional means for the linear states; `covariances`
     (N, l, l) of the linear states given each particle, in the order of the filter's `linear`; `weights` (N,), `ancestors` (N,).
     """
 
@@ -56,7 +57,7 @@ class MarginalisedBelief(AbstractBelief):
 
     @property
     def covariance(self):
-        """(n, n) in the order of the state's fields: between particles, and within them."""
+        """The covariance (n, n) in the order of the state's fields: between particles plus within them."""
         names = self.particles._fields
         centred = jnp.stack([field - m for field, m in zip(self.particles, self.mean, strict=True)])
         place = np.array([names.index(name) for name in self.linear])
@@ -108,8 +109,8 @@ class CloudWeights(NamedTuple):
 
 
 class Cloud(AbstractAhead):
-    """Particles before their measurement: the state's NamedTuple with (N,) fields, covariances (N, l, l), their weights in
-    `prior`, the filter's `key`, and the `count` of rows before."""
+    """Particles before their measurement: the state's NamedTuple with (N,) fields, `covariances` (N, l, l), their
+    weights in `prior`, the filter's `key`, and the `count` of rows before."""
 
     particles: Any
     covariances: Any
@@ -156,14 +157,15 @@ class Cloud(AbstractAhead):
 class Marginalised(AbstractParticleFilter):
     """The Rao-Blackwellised, or marginalised, particle filter (T. Schon, F. Gustafsson & P.-J. Nordlund 2005).
 
-    Given the path of the other states, the states `linear` have transition and observation linear in them and Gaussian noises:
-    each particle carries their exact Gaussian. With J the slopes of the transition by them, z the other states, x the linear
+    Given the path of the other states, transition and observation must be linear in the states `linear`, and noises
+    Gaussian: each particle carries the exact Gaussian of its linear states. With z the other states, x the linear
+    states, and J the slopes of the transition with respect to x:
 
-        (z, x)_{k+1} ~ N(f, J P J^T + Q),   z is drawn, x is given z:   what z's draw says of x is used
-        weights: N(y; h, H P H^T + R),      and x is given y
+        (z, x)_{k+1} ~ N(f, J P J^T + Q),   z is drawn, and x conditioned on the drawn z
+        weights: N(y; h, H P H^T + R),      and x is conditioned on y
 
-    It takes fewer particles than a filter that draws all states, by as much as the linear ones vary. Every other state must
-    carry process noise, all noises need covariances. A model that is not linear in `linear` raises `InputError`.
+    It needs fewer particles than a filter that draws all states; the more the linear states vary, the fewer. Every other state
+    must have process noise, and all noises must have covariances. A model that is not linear in `linear` raises `InputError`.
     """
 
     particles: int = eqx.field(static=True)
@@ -191,7 +193,7 @@ class Marginalised(AbstractParticleFilter):
         still = [name for name in _others(self, model) if name not in noisy]
         if still:
             raise InputError(
-                f"Marginalised: the drawn states {', '.join(still)} carry no process noise, which the conditional Gaussians "
+                f"Marginalised: the drawn states {', '.join(still)} have no process noise, which the conditional Gaussians "
                 "need. Make them linear states, or use ParticleFilter."
             )
         _check_linear_in(self.linear, model)
@@ -224,7 +226,7 @@ class Marginalised(AbstractParticleFilter):
             jax.tree.map(lambda leaf: leaf[ancestors], t) for t in (belief.particles, belief.covariances)
         )
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
-        assert model.process_noise is not None  # `check` has seen to it
+        assert model.process_noise is not None  # `check` ensures it
         law = model.process_noise.over(jnp.maximum(row.t - belief.t, SHORTEST))
         others = _others(self, model)
         Q = covariance_in(law, (*others, *self.linear), weights.dtype)
@@ -244,7 +246,7 @@ class Marginalised(AbstractParticleFilter):
 
 
 class GivenDraw(NamedTuple):
-    """Drawn states z (q,), and the Gaussian (x, P) of the linear ones given them."""
+    """Drawn states z (q,), and the Gaussian (x, P) of the linear states given them."""
 
     z: Any
     x: Any
@@ -252,7 +254,7 @@ class GivenDraw(NamedTuple):
 
 
 def _condition_on_first(mean, covariance, white) -> GivenDraw:
-    """The first q = len(white) of jointly Gaussian numbers drawn by `white` (q,), and the others given them."""
+    """The first q = len(white) of jointly Gaussian numbers, drawn by means of `white` (q,), and the others given them."""
     q = white.shape[0]
     if q == 0:
         return GivenDraw(white, mean, covariance)
@@ -263,7 +265,7 @@ def _condition_on_first(mean, covariance, white) -> GivenDraw:
 
 
 def _slopes(linear: tuple[str, ...], point, function) -> tuple[Any, Any]:
-    """Values (m,) of a function of the state at `point`, and their slopes (m, l) by the linear states."""
+    """Values (m,) of a function of the state at `point`, and their slopes (m, l) with respect to the linear states."""
     values = jnp.stack([getattr(point, name) for name in linear])
 
     def rows(values):
@@ -279,13 +281,13 @@ def _others(filter_: Marginalised, model: StateSpace) -> tuple[str, ...]:
 
 
 def _as_state(filter_: Marginalised, model: StateSpace, z, x) -> Any:
-    """The state's NamedTuple of rows z (q, N) and x (l, N)."""
+    """The state's NamedTuple, made of rows z (q, N) and x (l, N)."""
     values = dict(zip((*_others(filter_, model), *filter_.linear), (*z, *x), strict=True))
     return type(model.prior.mean)(**values)
 
 
 def _check_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
-    """Raise `InputError` naming the first value that is not linear in the states `linear`. Tracers pass."""
+    """Raise `InputError` with the name of the first state or channel that is not linear in the states `linear`. Tracers pass."""
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
     with concrete_values():
@@ -298,15 +300,15 @@ def _check_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
             )
 
 
-# Compiled: operation by operation it would take longer than filtering a short recording.
+# Compiled: without jit it would take longer than filtering a short recording.
 @eqx.filter_jit
 def _nonlinear_in(linear: tuple[str, ...], model: StateSpace) -> list[Any]:
-    """Which states and which channels are not linear in the states `linear`, (n,) and (m,)."""
+    """Whether each state (n,) and each channel (m,) is nonlinear in the states `linear`."""
     dtype = model.prior.mean[0].dtype
     t0, t1 = jnp.zeros((), dtype), jnp.asarray(0.01, dtype)
     u = record("Inputs", {name: jnp.asarray(1.0, dtype) for name in model.inputs})
     spread = dict(zip(model.states, 10.0 * jnp.sqrt(jnp.diagonal(model.prior.covariance())), strict=True))
-    # Not at the others' means, where a product with one that is zero would seem linear.
+    # Not at the means of the other states: where one of them is zero, a product with it would seem linear.
     point = type(model.prior.mean)(**{n: m + 0.1 * spread[n] for n, m in model.prior.mean._asdict().items()})
     move = lambda x: model.transition(t0, t1, x, model.step_inputs(t0, t1, u, u))
     see = lambda x: model.observation(t0, x, u)

@@ -1,4 +1,4 @@
-"""Beliefs that hold another filter's belief."""
+"""Beliefs that contain the belief of another filter."""
 
 from typing import Any
 
@@ -8,9 +8,9 @@ from jaxveh.statespace import AbstractBelief
 
 
 class AbstractOuterBelief(AbstractBelief):
-    """A belief around that of another filter, `inside`, whose time, inputs and count of rows are its own."""
+    """A belief around that of another filter, `inside`; its time, inputs and count of rows are those of `inside`."""
 
-    # No postponed annotations in this file: equinox does not see an AbstractVar in a string.
+    # No postponed annotations in this file: equinox does not recognise an AbstractVar in a string.
     inside: eqx.AbstractVar[Any]
 
     @property
@@ -25,12 +25,12 @@ class AbstractOuterBelief(AbstractBelief):
 
     @property
     def count(self):
-        """Rows so far, those that came late included."""
+        """The number of rows so far, late ones included."""
         return self.inside.count
 
 
 class AbstractTransparentBelief(AbstractOuterBelief):
-    """A belief that says of the state and of the report what the one `inside` says."""
+    """A belief whose state and report are those of the belief `inside`."""
 
     @property
     def mean(self):
@@ -44,7 +44,7 @@ class AbstractTransparentBelief(AbstractOuterBelief):
 
     @property
     def covariance(self):
-        """(n, n) in the order of the state's fields."""
+        """The covariance (n, n), in the order of the state's fields."""
         return self.inside.covariance
 
     def sample(self, key, draws):

@@ -1,4 +1,4 @@
-"""The bootstrap particle filter, and what every particle filter shares."""
+"""The bootstrap particle filter, and the base of all particle filters."""
 
 import abc
 from typing import Any, ClassVar, NamedTuple
@@ -25,21 +25,22 @@ from jaxveh.statespace import (
 )
 
 SHORTEST = 1e-9
-"""Of two rows at one time, seconds for which the noise between them is taken where its covariance must have a factor."""
+"""The time (s) for which the process noise between two rows at the same time is taken, so that its covariance has a factor."""
 
 
 class AbstractParticleFilter(AbstractTwoPartFilter):
-    """Shared by particle filters: `particles` (at least 2), `resampling` scheme, `threshold` of the ESS, `gradient`.
+    """The base of particle filters: `particles` (at least 2), `resampling` scheme, `threshold` of the ESS, `gradient`.
 
     `resampling(key, weights, n) -> ancestors` (see `numerics.systematic`, `stratified`, `multinomial`, `residual`), or an
     `AbstractResampling`: `Soft(...)` around one of these, or, for `ParticleFilter`, `Transport(...)`.
     `threshold`: resample where the ESS falls below this share of the particles; 1 (the default) resamples every step.
-    `gradient`: `"score"` (the default) adds the derivative of the choice of ancestors, so that the gradient of the
-    log-likelihood is right in the limit of many particles; its spread grows with the length of the recording. `"held"` leaves
-    it out: a smooth gradient with a **bias** that no number of particles cures, for parameters and noise levels alike.
+    `gradient`: `"score"` (the default) includes the derivative of the choice of ancestors, so that the gradient of the
+    log-likelihood is right in the limit of many particles; its scatter grows with the length of the recording. `"held"`
+    leaves that derivative out: the gradient is smooth, but has a **bias** that more particles do not reduce, for
+    parameters and noise levels alike.
     """
 
-    # No postponed annotations in this file: they would make fields of these.
+    # No postponed annotations in this file: they would turn these into fields.
     has_covariance: ClassVar[bool] = True
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
@@ -50,7 +51,7 @@ class AbstractParticleFilter(AbstractTwoPartFilter):
 
     @property
     def scheme(self) -> AbstractResampling:
-        """`resampling`, and what it can; a plain function draws ancestors and leaves equal weights."""
+        """`resampling` as an `AbstractResampling`; a plain function draws ancestors, with equal weights after it."""
         return as_resampling(self.resampling)
 
     @property
@@ -69,10 +70,10 @@ class AbstractParticleFilter(AbstractTwoPartFilter):
 
 
 def check_all_particles(who: str, filter: Any) -> None:
-    """Raise `InputError` unless weighted particles are all that a filter knows of a row."""
+    """Raise `InputError` unless the filter's belief consists of weighted particles only."""
     if not isinstance(filter, AbstractParticleFilter) or kit.smoothing_of(filter) is not Smoothing.particles:
         raise InputError(
-            f"{who}: {type(filter).__name__} inside: must be a filter of which particles are all it knows (ParticleFilter, "
+            f"{who}: {type(filter).__name__} inside: must be a filter whose belief is particles only (ParticleFilter, "
             "AuxiliaryParticleFilter, Guided)."
         )
 
@@ -87,7 +88,8 @@ def check_particle_settings(particles: int, threshold: float, gradient: str = "s
 
 
 def log_prob(model: StateSpace, row, particles):
-    """log p(y | x) of each particle over the channels present, (N,), and by channel what was measured less what it predicts."""
+    """log p(y | x) of each particle over the channels present, (N,), and by channel the measurement less the particle's
+    prediction."""
     measured, present = kit.presence(model, row)
     n = particles[0].shape[0]
     observed = model.observation(row.t, particles, row.u)
@@ -104,7 +106,7 @@ def log_prob(model: StateSpace, row, particles):
 
 
 def add_noise(model: StateSpace, key, particles, dt):
-    """The particles with a draw of the process noise over `dt` added to the fields that carry it."""
+    """The particles with a draw of the process noise over `dt` added to the fields that have it."""
     if model.process_noise is None:
         return particles
     noise = model.process_noise.over(dt).sample(key, particles[0].shape)
@@ -112,34 +114,34 @@ def add_noise(model: StateSpace, key, particles, dt):
 
 
 def replace_lost(moved, before):
-    """Particles of which those that the model lost, with a field that is not finite, stay as they were `before` the step, and
-    which these are, (N,): they must get no weight, and what has no weight must still be finite for a mean."""
+    """The particles, where lost ones, with a field that is not finite, are replaced by those `before` the step; and which are
+    lost, (N,). Lost particles must get zero weight, and particles of zero weight must be finite for a mean."""
     n = moved[0].shape[-1]
     lost = ~jnp.isfinite(sum((jnp.broadcast_to(field, (n,)) for field in moved[1:]), start=moved[0]))
     return jax.tree.map(lambda new, old: jnp.where(lost, old, new), moved, before), lost
 
 
 def without(lost, logs):
-    """Log weights (N,) of which those of the particles `lost` are minus infinity."""
+    """The log weights (N,) with minus infinity for the particles `lost`."""
     return jnp.where(lost, -jnp.inf, logs)
 
 
 def fate(alive, lost):
-    """The result code of a step after which some particle is `alive` or none, of particles that the model `lost` (N,)."""
+    """The result code of a step: successful if any particle is `alive`; `lost` (N,) are the particles that are not finite."""
     reason = jnp.where(jnp.all(lost), code(Result.non_finite_state), code(Result.all_particles_dead))
     return jnp.where(alive, code(Result.successful), reason)
 
 
 def start_particles(filter_, model, row, key):
-    """Draws of the prior, with the key that later steps fold their count into."""
+    """Draws of the prior, and the key into which later steps fold their count."""
     prior_key, key = jax.random.split(key)
     particles = model.prior.sample(prior_key, (filter_.particles,))
     return particles, key
 
 
 def noise_variances(model, row, particles, weights):
-    """Variances (m,) of the measurement noise in the order of the channels, NaN of a law that has none; where it depends on the
-    state, their weighted mean over the particles."""
+    """Variances (m,) of the measurement noise in the order of the channels, NaN if the law has none; if the noise
+    depends on the state, the weighted mean of its variances over the particles."""
     if not isinstance(model.measurement_noise, StateDependent):
         return _variances(model.measurement_noise, weights.dtype)
 
@@ -156,11 +158,11 @@ def _variances(law, dtype):
 
 
 def make_info(model, row, log_likelihood, residual, weights, became, within=None, particles=None, remark=None):
-    """The info of one step; `weights`: those of the prediction, whose residuals are given, and those after the row; `became`:
-    its result code where the input is right; `within`: the variance by channel that the residuals lack, but for R; `particles`
-    of the prediction, which noise that depends on the state is of."""
+    """The info of one step; `weights`: those of the prediction, to which the `residual` belongs, and those after the
+    row; `became`: the result code if the input is valid; `within`: by channel, the variance that the residuals do not
+    contain, without R; `particles`: those of the prediction, for noise that depends on the state."""
     before, after = weights
-    # A particle that shows nothing finite has no say.
+    # Particles whose observation is not finite are left out.
     known = jnp.isfinite(sum(residual[name] for name in model.channels))
     before = jnp.where(known, before, 0)
     residual = {name: jnp.where(known, residual[name], 0) for name in model.channels}
@@ -186,13 +188,13 @@ def make_info(model, row, log_likelihood, residual, weights, became, within=None
 
 
 def mean_variances(model, weights, variances):
-    """By channel the weighted mean of the variances (N, m) that particles carry themselves, of those that are finite."""
+    """By channel, the weighted mean of the particles' own variances (N, m); variances that are not finite count as zero."""
     return dict(zip(model.channels, weights @ jnp.where(jnp.isfinite(variances), variances, 0), strict=True))
 
 
 class DrawnParticles(NamedTuple):
-    """Particles before their measurement: where they came from, their weights and the logarithms of these, with derivatives;
-    `remark`: the code of how they were chosen."""
+    """Particles before their measurement: their `ancestors`, their weights and the logarithms of these, with
+    derivatives; `remark`: a code of how they were chosen."""
 
     ancestors: Any
     weights: Any
@@ -201,7 +203,7 @@ class DrawnParticles(NamedTuple):
 
 
 class AbstractAhead(eqx.Module):
-    """What a particle filter knows ahead of a row's measurement, and how that weighs it: what `_start` and `_predict` return."""
+    """A particle filter's prediction for a row, with its `update` by the measurement: `_start` and `_predict` return it."""
 
     @abc.abstractmethod
     def update(self, filter_: Any, model: StateSpace, row: Row) -> tuple[AbstractBelief, Info]:
@@ -209,7 +211,7 @@ class AbstractAhead(eqx.Module):
 
 
 class Expected(AbstractAhead):
-    """Particles that wait for their measurement: as they were `drawn`, which the model `lost` (N,), the filter's `key`, and the
+    """Particles before their measurement: their draw (`drawn`), which are `lost` (N,), the filter's `key`, and the
     `count` of rows before."""
 
     particles: Any
@@ -222,7 +224,7 @@ class Expected(AbstractAhead):
         logs, residual = log_prob(model, row, self.particles)
         weights, log_mean, alive = numerics.normalise(without(self.lost, logs + self.drawn.log_weights))
         belief = ParticleBelief(self.particles, weights, self.drawn.ancestors, self.key, row.t, row.u, self.count + 1)
-        # normalise gives the log of the mean over N of what sums to the likelihood.
+        # normalise gives the log of the mean over N; the likelihood is the sum.
         log_likelihood = log_mean + jnp.log(jnp.asarray(filter_.particles, weights.dtype))
         became = fate(alive, self.lost)
         both, remark = (self.drawn.weights, weights), self.drawn.remark
@@ -231,8 +233,8 @@ class Expected(AbstractAhead):
 
 
 class AbstractProposalFilter(AbstractParticleFilter):
-    """A particle filter whose noise is drawn as `propose` says and weighed for it; all else is the bootstrap filter's: first
-    particles from the prior, resampling before each step (Sarkka 2013, algorithm 7.4)."""
+    """A particle filter whose noise is drawn by `propose` and weighted accordingly. Everything else is as in the
+    bootstrap filter: first particles from the prior, resampling before each step (Sarkka 2013, algorithm 7.4)."""
 
     particles: int = eqx.field(static=True)
     resampling: Scheme = eqx.field(static=True, default=numerics.systematic)
@@ -244,8 +246,8 @@ class AbstractProposalFilter(AbstractParticleFilter):
 
     @abc.abstractmethod
     def propose(self, model: StateSpace, particles: Any, row: Row, dt: Any, key: Any) -> tuple[Any, Any]:
-        """The particles with their noise, from where the transition left them `dt` seconds later; and by how much more likely
-        each noise is under the model than it was to be drawn, as a logarithm (N,), None where it was drawn from the model."""
+        """The particles with noise added, given the particles after the transition over `dt` (s); and the logarithm (N,) of each
+        noise's density under the model over the density of its draw, None if it was drawn from the model."""
 
     def _start(self, model, row, key):
         particles, key = start_particles(self, model, row, key)

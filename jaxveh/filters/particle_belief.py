@@ -1,4 +1,4 @@
-"""What a particle filter knows."""
+"""The belief of a particle filter."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from jaxveh.statespace import AbstractBelief
 class ParticleBelief(AbstractBelief):
     """Weighted particles: the state's NamedTuple with (N,) in each field, and normalised weights (N,).
 
-    `ancestors` (N,): which particle of the belief before each came from.
+    `ancestors` (N,): for each particle, the index of its ancestor in the belief before.
     """
 
     particles: Any
@@ -38,12 +38,12 @@ class ParticleBelief(AbstractBelief):
 
     @property
     def covariance(self):
-        """(n, n) weighted covariance in the order of the state's fields."""
+        """The weighted covariance (n, n), in the order of the state's fields."""
         centred = jnp.stack([field - m for field, m in zip(self.particles, self.mean, strict=True)])
         return (centred * self.weights) @ centred.T
 
     def quantile(self, share: float):
-        """The weighted quantile of each field: the smallest value with at least `share` of the weight at or below."""
+        """The weighted quantile of each field: the smallest value with at least `share` of the weight at or below it."""
 
         def of(field):
             order = jnp.argsort(field)
@@ -60,7 +60,7 @@ class ParticleBelief(AbstractBelief):
         shown = model.report(self.t, self.particles, self.u)
         n = self.weights.shape[0]
         shown = jax.tree.map(lambda field: jnp.broadcast_to(field, (n,)), shown)
-        # Deviations from the first particle keep the digits of E[x^2] - E[x]^2, and one pass serves both moments.
+        # Deviations from the first particle keep the digits of E[x^2] - E[x]^2, and both moments need one pass only.
         base = jax.tree.map(lambda field: jax.lax.stop_gradient(field[0]), shown)
         first = jax.tree.map(lambda field, b: numerics.total(self.weights * (field - b)), shown, base)
         second = jax.tree.map(lambda field, b: numerics.total(self.weights * (field - b) ** 2), shown, base)

@@ -1,6 +1,6 @@
-"""Particles that move instead of being drawn: entropy-regularised optimal transport."""
+"""Resampling by entropy-regularised optimal transport: particles move instead of being drawn."""
 
-# No postponed annotations in this file: they would make fields of class variables.
+# No postponed annotations in this file: they would turn class variables into fields.
 
 from typing import Any
 
@@ -15,18 +15,18 @@ from jaxveh.filters.choosing import AbstractResampling, PlainDraw, Resampled, lo
 
 
 class Transport(AbstractResampling):
-    """Instead of a draw, every particle moves: optimal transport from the weighted to equal weights, smoothed by entropy.
+    """Resampling in which every particle moves: optimal transport from the weights to equal weights, smoothed by entropy.
 
         x_i <- N sum_j T_ij x_j,    T = argmin sum T_ij |x_i - x_j|^2 - epsilon entropy(T),    rows 1/N, columns w
 
     (A. Corenflos, J. Thornton, G. Deligiannidis & A. Doucet, Differentiable particle filtering via entropy-regularized optimal
-    transport, 2021; by Sinkhorn's iterations.) Fields count over their spread. The step is a smooth function of all it is
-    given, so that likelihoods of one key are smooth, too, and their gradient is exactly theirs. The **bias** is in the value:
-    particles are drawn together, the more the larger `epsilon`, and only as N grows and epsilon falls does it vanish. Measured on
-    a linear model of three states and 25 rows, 200 particles: log-likelihood 48, 6.2, 1.9, 1.0 too low with epsilon 1, 0.3,
-    0.1, 0.03, where the bootstrap filter's scatter costs 1.2. A step takes N^2 `iterations` exponentials: for some hundred
-    particles. Where after them more than `tolerance` of the weight is still misplaced, the step resamples systematically
-    instead, and says so: `info.remark = Result.transport_not_converged`, of which `run` tells.
+    transport, 2021; by Sinkhorn's iterations.) Each field is divided by its standard deviation. The step is a smooth function of
+    its arguments, so that the likelihood for one key is smooth, too, and its gradient is exact. The **bias** is in the value:
+    particles contract, the more the larger `epsilon`, and the bias vanishes only as N grows and epsilon falls. Measured on a
+    linear model of three states and 25 rows with 200 particles: log-likelihood 48, 6.2, 1.9, 1.0 too low with epsilon 1, 0.3,
+    0.1, 0.03, where that of the bootstrap filter is 1.2 too low by its scatter. A step takes N^2 `iterations` exponentials, so
+    that it suits some hundred particles. If more than `tolerance` of the weight is still misplaced after them, the step
+    resamples systematically instead, with `info.remark = Result.transport_not_converged`, of which `run` warns.
     """
 
     epsilon: float = eqx.field(static=True, default=0.1)
@@ -50,14 +50,16 @@ class Transport(AbstractResampling):
         )
 
     def move_particles(self, particles: Any, weights: Any) -> tuple[Any, Any]:
-        """The particles, (N,) in each field, moved to where equal weights say the same, and whether the plan converged."""
+        """The particles, (N,) in each field, moved so that equal weights represent the same distribution, and whether
+        the plan converged."""
         fields = jnp.stack(particles)
         overall = numerics.sqrt(jnp.var(fields, axis=1, keepdims=True))
-        # Where nearly all weight is in one place, distances have no digits left: what is taken instead is not used.
+        # If nearly all weight is in one place, distances have no digits left. The weights taken instead give a result
+        # that is not used.
         spread_out = jnp.all(_spread(fields, weights) >= NARROWEST * overall)
         safe = jnp.where(spread_out, weights, jnp.full_like(weights, 1.0 / weights.shape[0]))
         spread = _spread(fields, safe)
-        # A field that does not vary says nothing of distances.
+        # A field that does not vary adds nothing to the distances.
         scale = jnp.where(spread > 0, spread, 1.0)
         cost = distances(fields / scale)
         plan = transport_plan(cost, log_of(safe), self.epsilon, self.iterations)
@@ -73,10 +75,11 @@ def _spread(fields: Any, weights: Any) -> Any:
 
 
 NARROWEST = 1e-2
-"""The least spread of the weighted particles over that of all that a plan is made for."""
+"""The least ratio of the weighted particles' standard deviation to that of all particles for which a plan is made."""
 
 RELAXATION = 1.5
-"""How far an iteration goes beyond Sinkhorn's, once the smoothing has fallen (A. Thibault et al. 2021): a third fewer."""
+"""The over-relaxation of Sinkhorn's iterations once the smoothing has fallen (A. Thibault et al. 2021): a third fewer
+iterations."""
 
 
 def distances(points: Any) -> Any:
@@ -85,9 +88,9 @@ def distances(points: Any) -> Any:
 
 
 def transport_plan(cost: Any, log_weights: Any, epsilon: float, iterations: int) -> Any:
-    """N T (N, N), its rows sum to one, its columns nearly to N w: Sinkhorn's iterations in logarithms.
+    """N T (N, N), by Sinkhorn's iterations in logarithms; its rows sum to one, its columns nearly to N w.
 
-    In the first half of them the smoothing falls from the largest cost to `epsilon`.
+    In the first half of the iterations the smoothing falls from the largest cost to `epsilon`.
     """
     n = cost.shape[0]
     uniform = -jnp.log(jnp.asarray(n, cost.dtype))
@@ -103,14 +106,14 @@ def transport_plan(cost: Any, log_weights: Any, epsilon: float, iterations: int)
         return g + further * (found - g), None
 
     g, _ = jax.lax.scan(jax.checkpoint(iterate), jnp.zeros(n, cost.dtype), (falling, further))
-    # Rows that sum to one whatever g is: no particle leaves the others.
+    # Rows sum to one for any g, so that every particle moves to a mean of the others.
     raw, _ = _below_one(log_weights[None, :] + (g[None, :] - cost) / epsilon, axis=1)
     return raw / jnp.sum(raw, axis=1, keepdims=True)
 
 
 def _below_one(logs: Any, axis: int) -> tuple[Any, Any]:
-    """exp(logs - largest), and the largest. Where numbers are so large that one more rounding is a whole unit, as where XLA
-    computes them once for the largest and once for the difference, none is above one."""
+    """exp(logs - largest), at most one, and the largest. Without the bound, large numbers could exceed it: XLA may
+    compute `logs` once for the largest and once for the difference, with roundings that differ by a whole unit."""
     largest = jax.lax.stop_gradient(jnp.max(logs, axis=axis, keepdims=True))
     less = logs - largest
     return jnp.exp(jnp.where(less > 0.0, 0.0, less)), largest

@@ -1,4 +1,4 @@
-"""What the driver does over time: open-loop inputs with smooth edges, drivers who see the car, replays of recordings."""
+"""Driving manoeuvres: open-loop inputs with smooth edges, closed-loop drivers, replays of recordings."""
 
 from jaxveh.manoeuvres import kit
 from jaxveh.manoeuvres.base import AbstractManoeuvre, DriverInputs, PedalInputs

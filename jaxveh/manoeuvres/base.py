@@ -1,4 +1,4 @@
-"""The one contract of a manoeuvre: time in, the driver's inputs out."""
+"""The contract of a manoeuvre: the driver's inputs as a function of time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from jaxveh.numerics import smooth_step
 
 
 class DriverInputs(NamedTuple):
-    """`steer` (rad at the road wheels, positive to the left), `v_x` (m/s) and its rate `v_x_rate` (m/s^2)."""
+    """`steer` (rad at the road wheels, positive to the left), the speed `v_x` (m/s) and its rate `v_x_rate` (m/s^2)."""
 
     steer: Any
     v_x: Any
@@ -25,7 +25,7 @@ class DriverInputs(NamedTuple):
 
 
 class PedalInputs(NamedTuple):
-    """`DriverInputs` of a driver who works the pedals, too.
+    """`DriverInputs` with pedals.
 
     `drive_torque` and `brake_torque` (N m, never negative): totals at the wheels.
     """
@@ -38,9 +38,9 @@ class PedalInputs(NamedTuple):
 
 
 class AbstractManoeuvre(eqx.Module):
-    """A function of time: what the driver does from t = 0 to `duration` (s). Array leaves are its parameters.
+    """The driver's inputs as a function of time from t = 0 to `duration` (s). Array leaves are its parameters.
 
-    `adds_to_pedals`: its torques are no pedals of their own, but come on top of those that hold its speed.
+    `adds_to_pedals`: its torques are added to the pedals of a `SpeedControl` that holds its speed.
     """
 
     duration: eqx.AbstractVar[float]
@@ -61,33 +61,33 @@ class AbstractSteering(AbstractManoeuvre):
 
     @abc.abstractmethod
     def form(self, t: jax.Array) -> jax.Array:
-        """The steer over `steer` (-) at times t (s)."""
+        """The steer angle relative to `steer` (-) at times t (s)."""
 
     def inputs(self, t: Any) -> DriverInputs:
         return constant_speed(self.steer * self.form(as_time(t, self.steer)), self.speed)
 
 
 def window(t: jax.Array, start: float, end: float, edge: float) -> jax.Array:
-    """1 between `start` and `end` but for smooth edges of length `edge` inside them, 0 outside."""
+    """1 between `start` and `end`, with smooth edges of length `edge` inside this range, and 0 outside."""
     return smooth_step((t - start) / edge) * smooth_step((end - t) / edge)
 
 
 def constant_speed(steer: jax.Array, speed: jax.Array) -> DriverInputs:
-    """Steering at a constant speed."""
+    """The inputs for steering at a constant speed."""
     v_x = jnp.broadcast_to(speed, jnp.shape(steer)).astype(steer.dtype)
     return DriverInputs(steer=steer, v_x=v_x, v_x_rate=jnp.zeros_like(steer))
 
 
 def check_drive(speed, duration, steer=0.0) -> None:
-    """Raise `InputError` unless speed, duration and steer are those of a drive."""
+    """Raise `InputError` unless speed, duration and steer are within their ranges."""
     check_finite("speed", speed)
     check_at_least("speed", speed, 0.0)
     check("steer", steer, lambda v: abs(v) < math.pi / 2, "within a quarter turn", "It is in rad, not degrees.")
     check_positive("duration", duration, "s")
     if eqx.is_array(duration):
-        raise InputError("duration is an array: it must be a Python number, because it sets how many rows there are.")
+        raise InputError("duration is an array: it must be a Python number, because it sets the number of rows.")
 
 
 def as_time(t: Any, like: jax.Array) -> jax.Array:
-    """The time as an array of a parameter's type."""
+    """The time as an array of the dtype of the parameter `like`."""
     return jnp.asarray(t, jnp.result_type(like))

@@ -1,4 +1,4 @@
-"""Open-loop braking: in a turn with the steer held, and straight ahead over changing friction."""
+"""Open-loop braking: in a turn with constant steer, and straight ahead over changing friction."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from jaxveh.manoeuvres.base import AbstractManoeuvre, PedalInputs, as_time, chec
 from jaxveh.numerics import smooth_ramp, smooth_step
 
 _LAST_SPEED = 0.5
-"""Below this speed (m/s) the demanded deceleration fades out, so that it ends at standstill without a corner."""
+"""Below this speed (m/s) the demanded deceleration fades out, so that it ends smoothly at standstill."""
 
 
 class Braking(AbstractManoeuvre):
-    """A smooth ramp to a held steer, then a smooth ramp to a held brake.
+    """A smooth ramp to a constant steer, then a smooth ramp to a constant brake torque.
 
-    `v_x` and `v_x_rate` say what the brakes are meant to do: `deceleration` from `brake_at` on, down to standstill. For
-    cars whose wheels turn by torque, `drive_torque` falls to zero while `brake_torque` rises.
+    `v_x` and `v_x_rate` are the demanded speed and its rate: `deceleration` from `brake_at` on, down to standstill. For
+    cars driven by torques, `drive_torque` falls to zero while `brake_torque` rises.
     """
 
     ramp: float = eqx.field(static=True)
@@ -57,13 +57,13 @@ def braking_in_a_turn(
     speed, steer, deceleration=5.0, *, mass=1500.0, wheel_radius=0.3, drive_torque=0.0, ramp: float = 1.0,
     start: float = 0.5, brake_at: float = 5.0, brake_ramp: float = 0.3, duration: float = 10.0,
 ) -> Braking:  # fmt: skip
-    """Braking in a turn with the steer held at `steer` (rad at the road wheels), from `speed` (m/s) (ISO 7975).
+    """Braking in a turn with a constant `steer` (rad at the road wheels), from `speed` (m/s) (ISO 7975).
 
-    Steer rises over `ramp` from `start` on; brakes from `brake_at` on over `brake_ramp` (s) to `deceleration` (m/s^2).
-    Cars driven by torque get the brake torque `mass wheel_radius deceleration` (kg, m) and, before, a held
-    `drive_torque` (N m, both at the wheels).
+    The steer rises over `ramp` from `start` on; the brakes act from `brake_at` on, and rise over `brake_ramp` (s) to
+    `deceleration` (m/s^2). For cars driven by torques, the brake torque is `mass wheel_radius deceleration` (kg, m),
+    and before braking there is a constant `drive_torque` (N m, both at the wheels).
 
-    **Raises** `InputError` for values out of range, or a brake that is not pressed within the duration.
+    **Raises** `InputError` for values out of range, or a brake that is not fully applied within the duration.
     """
     check_drive(speed, duration, steer)
     check_positive("deceleration", deceleration, "m/s^2")
@@ -87,7 +87,8 @@ def mu_jump_braking(
     speed, deceleration=8.0, *, mass=1500.0, wheel_radius=0.3, brake_at: float = 1.0, brake_ramp: float = 0.3,
     duration: float = 8.0,
 ) -> Braking:  # fmt: skip
-    """Braking straight ahead at a held brake torque, to be driven over a road with a jump (`roads.MuJump`) or split.
+    """Braking straight ahead with a constant brake torque, for a road with a jump of friction (`roads.MuJump`) or split
+    friction.
 
     Arguments and errors are those of `braking_in_a_turn`; the steer is zero.
     """

@@ -1,4 +1,4 @@
-"""Driving between cones: the lanes of ISO 3888, a slalom, where the cones stand, and whether a car hits them."""
+"""Driving between cones: the lanes of ISO 3888, a slalom, the positions of the cones, and whether a car hits them."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from jaxveh._core.errors import InputError, check_finite, check_positive
 from jaxveh.manoeuvres.paths import LaneChanges
 
 CONE_DIAMETER = 0.3
-"""Diameter of a cone's base, m: ours."""
+"""The diameter of a cone's base, m: our choice."""
 
 
 class Lane(NamedTuple):
     """A straight lane between cones, from `start` to `end` (m along x), between `right` and `left` (m along y).
 
-    A side is infinite where the lane has no limit there.
+    A side without a limit is infinite.
     """
 
     start: float
@@ -29,27 +29,27 @@ class Lane(NamedTuple):
 
     @property
     def centre(self) -> float:
-        """Its centre line, m along y."""
+        """The centre line of the lane, m along y."""
         return (self.left + self.right) / 2
 
 
 class Course(NamedTuple):
-    """The lanes of a test in their order, each of which limits the car; between them nothing does."""
+    """The lanes of a test in their order. Each lane limits the car; between them there are no limits."""
 
     name: str
     lanes: tuple[Lane, ...]
 
 
 def iso_3888_1(width: float, start: float = 30.0) -> Course:
-    """The double lane change of ISO 3888-1 for a car of a `width` (m, without mirrors), from `start` (m) on.
+    """The double lane change of ISO 3888-1 for a car of this `width` (m, without mirrors), from `start` (m) on.
 
     Sections of 15, 30, 25, 25, 15 and 15 m, 125 m in all (the last two are one lane). Lane widths 1.1 w + 0.25, 1.2 w +
     0.25 and 1.3 w + 0.25 m. y = 0 is the first lane's centre line.
 
-    Figures: ISO 3888-1:2018, figure 1 and table 1, from secondary sources; the standard itself was not at hand. Assumed is that
-    the offset of 3.5 m is that of right limits, from the first lane's to the second's, and that the third lane's right limit is
-    in line with the first's, so that it is wider on the left alone. If the offset were meant otherwise (of centre lines, say) the
-    second lane would lie 0.05 w further right.
+    The numbers are those of ISO 3888-1:2018, figure 1 and table 1, from secondary sources; the standard itself was not
+    available. It is assumed that the offset of 3.5 m is from the right limit of the first lane to that of the second,
+    and that the right limits of the third and the first lane are in line, so that the third lane is wider on the left
+    only. If the offset is between centre lines instead, the second lane lies 0.05 w further right.
 
     **Raises** `InputError` for a width that is not positive.
     """
@@ -65,14 +65,15 @@ def iso_3888_1(width: float, start: float = 30.0) -> Course:
 
 
 def iso_3888_2(width: float, start: float = 30.0) -> Course:
-    """The obstacle avoidance of ISO 3888-2 for a car of a `width` (m, without mirrors), from `start` (m) on.
+    """The obstacle avoidance of ISO 3888-2 for a car of this `width` (m, without mirrors), from `start` (m) on.
 
     Sections of 12, 13.5, 11, 12.5 and 12 m, 61 m in all. Lane widths 1.1 w + 0.25, w + 1 and 1.3 w + 0.25 m, the last at
     least 3 m. y = 0 is the first lane's centre line.
 
-    Figures: ISO 3888-2:2011, figure 1 and table 1, from secondary sources; the standard itself was not at hand. Assumed is that
-    the offset of 1 m is the gap from the first lane's left limit to the second's right limit, and that the third lane's left
-    limit is in line with the first's, so that it is wider on the right alone, and the way back into it as far as the way out.
+    The numbers are those of ISO 3888-2:2011, figure 1 and table 1, from secondary sources; the standard itself was not
+    available. It is assumed that the offset of 1 m is the gap from the first lane's left limit to the second's right
+    limit, and that the left limits of the third and the first lane are in line, so that the third lane is wider on the
+    right only, and the gap on the way back is the same as on the way out.
 
     **Raises** `InputError` for a width that is not positive.
     """
@@ -88,10 +89,11 @@ def iso_3888_2(width: float, start: float = 30.0) -> Course:
 
 
 def slalom_cones(spacing: float = 18.0, count: int = 6, start: float = 30.0, diameter: float = CONE_DIAMETER) -> Course:
-    """The cones of a `slalom_course` with the same `spacing` (m), `count` and `start` (m): lanes of no length, open to one side.
+    """The cones of a `slalom_course` with the same `spacing` (m), `count` and `start` (m), as lanes of zero length,
+    open on one side.
 
-    Cone k (from 0) stands at x = start + (1.5 + k) spacing, y = 0; it is passed on its right where k is even, else on its
-    left, beyond its base of a `diameter` (m), whose extent along x is left out.
+    Cone k (from 0) stands at x = start + (1.5 + k) spacing, y = 0. The car passes it on its right if k is even,
+    otherwise on its left, outside its base of `diameter` (m); the extent of the base along x is neglected.
 
     **Raises** `InputError` for a spacing or diameter that is not positive, or fewer than 2 cones.
     """
@@ -106,7 +108,7 @@ def slalom_cones(spacing: float = 18.0, count: int = 6, start: float = 30.0, dia
 
 
 def check_slalom(spacing, count, start) -> None:
-    """Raise `InputError` unless these are those of a slalom's cones."""
+    """Raise `InputError` unless these are valid for the cones of a slalom."""
     check_positive("spacing", spacing, "m")
     check_finite("start", start)
     if count < 2:
@@ -116,16 +118,17 @@ def check_slalom(spacing, count, start) -> None:
 def centre_line(course: Course, lead: float) -> LaneChanges:
     """A smooth path through the middle of a course of three lanes that starts along x.
 
-    `lead` (m): each lane is left that far before its end and met that far after its start, which makes the turns wider.
+    `lead` (m): the path leaves each lane's middle this far before its end and reaches it this far after its start,
+    which makes the turns wider.
 
-    **Raises** `InputError` for a course of other than three lanes, or a lead that does not fit into the lanes.
+    **Raises** `InputError` for a course that does not have three lanes, or a lead that does not fit into the lanes.
     """
     if len(course.lanes) != 3:
-        raise InputError(f"course = {course.name}: {len(course.lanes)} lanes; there must be 3.")
+        raise InputError(f"course = {course.name}: {len(course.lanes)} lanes; must have 3.")
     first, second, third = course.lanes
     if not 0 <= 2 * lead <= second.end - second.start:
         raise InputError(
-            f"lead = {lead}: must be between 0 and half the second lane, {(second.end - second.start) / 2} m."
+            f"lead = {lead}: must be between 0 and half the length of the second lane, {(second.end - second.start) / 2} m."
         )
     return LaneChanges(
         over=second.centre - first.centre,
@@ -138,10 +141,10 @@ def centre_line(course: Course, lead: float) -> LaneChanges:
 
 
 def cones(course: Course, spacing: float = 3.0, diameter: float = CONE_DIAMETER) -> np.ndarray:
-    """Centres of the cones, (n, 2) of x and y in m: along both limits of each lane, its ends included.
+    """The centres of the cones, (n, 2) of x and y (m), along both limits of each lane, including its ends.
 
-    The limits touch the cones' bases (of a `diameter`, m) from inside, as in ISO 3888. They stand evenly, at most `spacing`
-    (m) apart: that is ours. Sides without a limit have no cones.
+    The bases of the cones (of `diameter`, m) touch the limits from outside, as in ISO 3888. The cones stand evenly, at
+    most `spacing` (m) apart, which is our choice. Sides without a limit have no cones.
 
     **Raises** `InputError` for a spacing or diameter that is not positive.
     """
@@ -157,11 +160,12 @@ def cones(course: Course, spacing: float = 3.0, diameter: float = CONE_DIAMETER)
 
 
 def clearance(x: Any, y: Any, yaw: Any, width: Any, length: Any, course: Course, centre: Any = 0.0) -> jax.Array:
-    """The least distance, m along y, of a driven body's outline to the limits of the lanes; negative is a hit.
+    """The least distance, m along y, from the outline of a driven body to the limits of the lanes; negative if it hits a cone.
 
-    `x`, `y` (m), `yaw` (rad): (T,), the centre of gravity and heading at the rows of a drive. `width`, `length` (m) of
-    the body, a rectangle whose middle is `centre` (m) ahead of the centre of gravity. Minus infinity where the drive does
-    not go through the whole course. Between rows nothing is seen: 0.01 s at 100 km/h is 0.3 m.
+    `x`, `y` (m), `yaw` (rad): (T,), the position of the centre of gravity and the heading in the rows of a drive.
+    `width`, `length` (m): those of the body, a rectangle whose middle is `centre` (m) ahead of the centre of gravity.
+    The result is minus infinity if the drive does not go through the whole course. Positions between rows are not
+    checked: 0.01 s at 100 km/h is 0.3 m.
 
     **Raises** `InputError` for a size that is not positive.
     """
@@ -180,14 +184,15 @@ def passes(x: Any, y: Any, yaw: Any, width: Any, length: Any, course: Course, ce
 
 
 def _corners(x, y, yaw, width, length, centre):
-    """The outline's corners in their order, (x, y) each."""
+    """The corners of the outline in order, (x, y) each."""
     cosine, sine = jnp.cos(yaw), jnp.sin(yaw)
     places = [(f * length / 2 + centre, s * width / 2) for f, s in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
     return [(x + ahead * cosine - left * sine, y + ahead * sine + left * cosine) for ahead, left in places]
 
 
 def _margin(corners, lane: Lane):
-    """The least distance to the lane's limits of the outline within it: of corners there, and where sides enter or leave."""
+    """The least distance of the outline within the lane to the lane's limits: at corners in it, and where sides enter
+    or leave it."""
     margins = []
     for (x, y), (x_next, y_next) in zip(corners, corners[1:] + corners[:1], strict=True):
         margins.append(_within(y, lane, (x >= lane.start) & (x <= lane.end)))

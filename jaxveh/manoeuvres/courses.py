@@ -1,4 +1,4 @@
-"""Closed-loop manoeuvres: a path, a speed, and a driver who follows them."""
+"""Closed-loop manoeuvres: a path, a speed, and a driver that follows them."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def iso_lane_change(
 ) -> PathDriver:
     """The double lane change of ISO 3888-1 in closed loop at `speed` (m/s) with a car of a `width` (m).
 
-    The course is `iso_3888_1(width, start)`; the car starts in the origin along x. `lead` (m): see `centre_line`.
-    `duration` (s): by default until 15 m behind the course. `driver`: parameters of the `PathDriver` by name.
+    The course is `iso_3888_1(width, start)`; the car starts at the origin along x. `lead` (m): see `centre_line`.
+    `duration` (s): by default until 15 m after the course. `driver`: parameters of the `PathDriver` by name.
 
     **Raises** `InputError` for values out of range.
     """
@@ -44,7 +44,7 @@ def iso_obstacle_avoidance(
 ) -> PathDriver:
     """The obstacle avoidance of ISO 3888-2 in closed loop at `speed` (m/s) with a car of a `width` (m).
 
-    The course is `iso_3888_2(width, start)`; otherwise as `iso_lane_change`; `preview_time` (s) is the driver's.
+    The course is `iso_3888_2(width, start)`; otherwise as in `iso_lane_change`; `preview_time` (s): that of the driver.
     """
     path = centre_line(iso_3888_2(width, start), lead)
     return _driver(path, speed, start + 76.0, duration, {"preview_time": preview_time, **driver})
@@ -53,14 +53,15 @@ def iso_obstacle_avoidance(
 def slalom_course(
     speed, amplitude=1.5, *, spacing=18.0, count: int = 6, start: float = 30.0, duration: float | None = None, **driver
 ) -> PathDriver:
-    """A slalom in closed loop at `speed` (m/s): a sine path of an `amplitude` (m) that passes cones on alternating sides.
+    """A slalom in closed loop at `speed` (m/s): a sine path of this `amplitude` (m) that passes cones on alternating sides.
 
-    `count` cones stand `spacing` (m) apart along x, as `slalom_cones(spacing, count, start)` says. The path leaves the x axis
-    at `start` (m), swings to the left, and passes the first cone, 1.5 spacings on, on its right; it has its whole amplitude at
-    every cone. The driver cuts it a little: at 14 m/s a car is 1.1 to 1.2 m beside the cones. Otherwise as `iso_lane_change`.
+    `count` cones stand `spacing` (m) apart along x, at the positions of `slalom_cones(spacing, count, start)`. The path
+    leaves the x axis at `start` (m) to the left and passes the first cone, 1.5 spacings further on, on its right; it
+    has its full amplitude at every cone. The driver cuts the corners a little: at 14 m/s a car is 1.1 to 1.2 m beside
+    the cones. Otherwise as in `iso_lane_change`.
     """
     check_slalom(spacing, count, start)
-    # Half a wave more at either end than there are cones: in it the sine fades.
+    # Half a wavelength more at either end, in which the sine fades in and out.
     path = Sine(amplitude, 2.0 * spacing, start, count / 2 + 1)
     return _driver(path, speed, start + (count + 3) * spacing, duration, driver)
 
@@ -69,11 +70,11 @@ def steady_circle(
     radius=40.0, from_speed=5.0, to_speed=16.0, *, time: float = 60.0, start: float = 2.0, duration: float | None = None,
     **driver,
 ) -> PathDriver:  # fmt: skip
-    """A circle of a `radius` (m, negative to the right) at a speed that rises slowly (ISO 4138, constant radius).
+    """A circle of this `radius` (m, negative to the right) at a slowly rising speed (ISO 4138, constant radius).
 
     The speed rises from `from_speed` to `to_speed` (m/s) within `time` (s) from `start` (s) on; the defaults end at
-    6.4 m/s^2, which a passenger car on a dry road can follow. `duration` (s): by default until 2 s after.
-    The car starts in the origin along x. `driver`: parameters of the `PathDriver` by name.
+    6.4 m/s^2, which a passenger car on a dry road can follow. `duration` (s): by default until 2 s after the rise. The
+    car starts at the origin along x. `driver`: parameters of the `PathDriver` by name.
 
     **Raises** `InputError` for values out of range.
     """
@@ -87,7 +88,7 @@ def steady_circle(
 def _driver(path, speed, length: float, duration: float | None, driver: dict) -> PathDriver:
     if duration is None:
         if not is_concrete(speed):
-            raise InputError("duration = None: a traced speed does not say how long the drive is; give it in s.")
+            raise InputError("duration = None: it cannot be computed from a traced speed; give it in s.")
         check_finite("speed", speed)
         check_positive("speed", speed, "m/s")
         duration = math.ceil(100 * length / float(speed)) / 100

@@ -1,4 +1,4 @@
-"""Straight on with a wavering speed and a restless foot: what shows mass and grade."""
+"""Driving straight ahead with varying speed and pedals, for the estimation of mass and grade."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from jaxveh.numerics import gauss_markov_harmonics, smooth_ramp, sum_of_harmonic
 
 
 class Cruise(AbstractManoeuvre):
-    """Straight on at a given speed over time, with coloured noise on the pedals.
+    """Driving straight ahead at a given speed over time, with coloured noise on the pedals.
 
-    The pedals carry the noise alone, drive where it is positive and brake where it is negative (within a tenth of its
-    spread about zero both, their difference being the noise): what holds the speed is `SpeedControl`, which adds them.
-    `jaxveh.simulate` puts one around it where the car is driven by torques.
+    The pedals are the noise only: `drive_torque` where it is positive and `brake_torque` where it is negative (within a tenth of
+    its standard deviation about zero both are positive, and their difference is the noise). `SpeedControl` holds the speed and
+    adds these pedals; `jaxveh.simulate` wraps it around this manoeuvre if the car is driven by torques.
     """
 
     adds_to_pedals: ClassVar[bool] = True
@@ -47,11 +47,11 @@ def cruise(
     speed, key: jax.Array, *, speed_std=2.0, speed_time: float = 10.0, pedal_noise=50.0, pedal_time: float = 2.0,
     count: int = 40, duration: float = 120.0,
 ) -> Cruise:  # fmt: skip
-    """Straight on about `speed` (m/s) for estimating mass and grade; `key` draws speed and pedals.
+    """Driving straight ahead at about `speed` (m/s) to estimate mass and grade; `key` draws speed and pedals.
 
-    `speed_std` (m/s): spread of the wanted speed, of the correlation time `speed_time` (s); zero holds it.
-    `pedal_noise` (N m, total at the wheels): spread of the coloured noise on the pedals, of the correlation time
-    `pedal_time` (s), nothing in it faster than four swings a second.
+    `speed_std` (m/s): standard deviation of the demanded speed, with the correlation time `speed_time` (s); zero gives
+    a constant speed. `pedal_noise` (N m, total at the wheels): standard deviation of the coloured noise on the pedals,
+    with the correlation time `pedal_time` (s) and no frequencies above 4 Hz.
 
     **Raises** `InputError` for values out of range.
     """

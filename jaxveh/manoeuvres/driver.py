@@ -1,4 +1,4 @@
-"""The contract of a driver who sees the car, and the driver who does not look."""
+"""The contract of a closed-loop driver, and the open-loop driver."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from jaxveh.vehicles import Motion
 
 
 class AbstractDriver(eqx.Module):
-    """A driver who sees the car: from the time, the car's motion and his own state to the car's inputs.
+    """A closed-loop driver: the car's inputs as a function of the time, the car's motion and the driver's own state.
 
     Array leaves are parameters. States (reaction lag, integrals) are scalars of a NamedTuple whose fields are
-    `state_names`; a simulation carries them beside the car's. Elementwise, from t = 0 to `duration` (s).
+    `state_names`; a simulation integrates them together with the car's. The driver works elementwise, from t = 0 to
+    `duration` (s).
 
     **Raises** `InputError` for parameters outside their domain.
     """
@@ -35,12 +36,13 @@ class AbstractDriver(eqx.Module):
 
     @property
     def fastest_rate(self) -> Any:
-        """About how fast the quickest of his loops is, 1/s; None where nobody has said, so that a simulation has to look."""
+        """The approximate rate of the driver's fastest loop, 1/s; None if it is unknown, so that a simulation must
+        determine it."""
         return None
 
     @abc.abstractmethod
     def start(self, t: Any, motion: Motion) -> Any:
-        """The state that has settled at a motion."""
+        """The settled state at a motion."""
 
     @abc.abstractmethod
     def inputs(self, t: Any, motion: Motion, state: Any) -> Any:
@@ -48,13 +50,13 @@ class AbstractDriver(eqx.Module):
 
     @abc.abstractmethod
     def derivatives(self, t: Any, motion: Motion, state: Any) -> Any:
-        """The state's time derivative, the same NamedTuple."""
+        """The state's time derivative, as the same NamedTuple."""
 
 
 class OpenLoop(AbstractDriver):
-    """The driver who does a manoeuvre with his eyes closed: `inputs(t)`, no states.
+    """The open-loop driver, who drives a manoeuvre without feedback: `inputs(t)`, no states.
 
-    **Raises** `InputError` for what is no manoeuvre.
+    **Raises** `InputError` for anything that is not a manoeuvre.
     """
 
     manoeuvre: AbstractManoeuvre
@@ -89,5 +91,5 @@ def driver_state(names: tuple[str, ...]):
 
 
 def as_driver(what: AbstractDriver | AbstractManoeuvre) -> AbstractDriver:
-    """A driver as it is, a manoeuvre as `OpenLoop`; raises `InputError` for anything else."""
+    """A driver unchanged, or a manoeuvre as `OpenLoop`; raises `InputError` for anything else."""
     return what if isinstance(what, AbstractDriver) else OpenLoop(what)

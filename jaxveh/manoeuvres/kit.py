@@ -1,4 +1,4 @@
-"""What those who add a manoeuvre build with."""
+"""The parts for adding a manoeuvre."""
 
 from jaxveh.manoeuvres.base import AbstractSteering, as_time
 from jaxveh.manoeuvres.speed_control import AIR_DENSITY

@@ -20,7 +20,7 @@ from jaxveh.manoeuvres.steering import double_lane_change, step_steer, swept_sin
 
 
 class DriveSettings(NamedTuple):
-    """What a named manoeuvre is made of: `speed` (m/s), `steer` (rad at the road wheels), `options` by name, `key`."""
+    """The settings of a named manoeuvre: `speed` (m/s), `steer` (rad at the road wheels), `options` by name, `key`."""
 
     speed: float
     steer: float
@@ -29,7 +29,11 @@ class DriveSettings(NamedTuple):
 
 
 class NamedManoeuvre(NamedTuple):
-    """How to make a manoeuvre, whether the driver sees the car and whether he works the pedals, and what to say."""
+    """A named manoeuvre.
+
+    `make`: the function that makes it; `help`: one line about it; `closed_loop`: whether its driver uses feedback;
+    `pedals`: whether its inputs include pedals.
+    """
 
     make: Callable[[DriveSettings], AbstractManoeuvre | AbstractDriver]
     help: str
@@ -39,30 +43,30 @@ class NamedManoeuvre(NamedTuple):
 
 MANOEUVRES: dict[str, NamedManoeuvre] = {
     "double-lane-change": NamedManoeuvre(
-        lambda d: double_lane_change(d.speed, d.steer, **d.options), "a sine period of steer and its mirror, open loop"
+        lambda d: double_lane_change(d.speed, d.steer, **d.options), "one sine period of steer and its mirror image, open loop"
     ),
     "step-steer": NamedManoeuvre(lambda d: step_steer(d.speed, d.steer, **d.options), "a steer step (ISO 7401)"),
     "swept-sine": NamedManoeuvre(
-        lambda d: swept_sine(d.speed, d.steer, **d.options), "sine steer of rising frequency (ISO 7401)"
+        lambda d: swept_sine(d.speed, d.steer, **d.options), "sine steer with rising frequency (ISO 7401)"
     ),
     "sine-with-dwell": NamedManoeuvre(
-        lambda d: sine_with_dwell(d.speed, d.steer, **d.options), "0.7 Hz sine held at its second peak (FMVSS 126)"
+        lambda d: sine_with_dwell(d.speed, d.steer, **d.options), "0.7 Hz sine steer, held at its second peak (FMVSS 126)"
     ),
     "ramp-steer": NamedManoeuvre(
-        lambda d: ramp_steer(d.speed, d.steer, **d.options), "steer that grows slowly at constant speed (ISO 4138)"
+        lambda d: ramp_steer(d.speed, d.steer, **d.options), "slowly growing steer at constant speed (ISO 4138)"
     ),
     "slalom": NamedManoeuvre(lambda d: slalom(d.speed, d.steer, **d.options), "sine periods of steer, open loop"),
     "random-steering": NamedManoeuvre(
-        lambda d: random_steering(d.speed, d.steer, d.key, **d.options), "random steer in a band (ISO 7401); steer is its spread"
+        lambda d: random_steering(d.speed, d.steer, d.key, **d.options), "random steer in a band (ISO 7401); steer is its std"
     ),
     "braking-in-a-turn": NamedManoeuvre(
-        lambda d: braking_in_a_turn(d.speed, d.steer, **d.options), "brakes pressed with the steer held (ISO 7975)", pedals=True
+        lambda d: braking_in_a_turn(d.speed, d.steer, **d.options), "braking with constant steer (ISO 7975)", pedals=True
     ),
     "mu-jump-braking": NamedManoeuvre(
         lambda d: mu_jump_braking(d.speed, **d.options), "braking straight ahead, for roads mu-jump and split-mu", pedals=True
     ),
     "cruise": NamedManoeuvre(
-        lambda d: cruise(d.speed, d.key, **d.options), "straight on, speed and pedals wavering, for mass and grade", pedals=True
+        lambda d: cruise(d.speed, d.key, **d.options), "straight ahead, varying speed and pedals, for mass and grade", pedals=True
     ),
     "iso-lane-change": NamedManoeuvre(
         lambda d: iso_lane_change(d.speed, **d.options), "double lane change between cones (ISO 3888-1)", closed_loop=True
@@ -77,18 +81,18 @@ MANOEUVRES: dict[str, NamedManoeuvre] = {
         lambda d: steady_circle(to_speed=d.speed, **d.options), "a circle at slowly rising speed (ISO 4138)", closed_loop=True
     ),
 }  # fmt: skip
-"""Manoeuvres by name, for programs: each is made of speed, steer, options and a key, of which it takes what it needs."""
+"""Manoeuvres by name, for programs: each is made from speed, steer, options and a key, as far as it needs them."""
 
 
 def named_manoeuvre(
     name: str, speed: float, steer: float = 0.05, key: jax.Array | None = None, **options
 ) -> AbstractManoeuvre | AbstractDriver:
-    """The manoeuvre or driver of a name in `MANOEUVRES`.
+    """The manoeuvre or driver of this name in `MANOEUVRES`.
 
-    `speed` (m/s; of "steady-circle" the last), `steer` (rad at the road wheels, where the manoeuvre has one), `key` for
-    random ones (default `jax.random.key(0)`), `options`: keyword arguments of its function, `duration` among them.
+    `speed` (m/s; for "steady-circle" the final speed), `steer` (rad at the road wheels, if the manoeuvre has one), `key`: for
+    random manoeuvres (default `jax.random.key(0)`), `options`: keyword arguments of its function, such as `duration`.
 
-    **Raises** `InputError` for another name or option, listing those there are, and as its function does.
+    **Raises** `InputError` for an unknown name or option, with a list of the known ones, and as its function does.
     """
     check_one_of("manoeuvre", name, MANOEUVRES)
     check_options(name, options)

@@ -1,4 +1,4 @@
-"""What can be set of a manoeuvre by name, beyond speed and steer."""
+"""The options of named manoeuvres, besides speed and steer."""
 
 from __future__ import annotations
 
@@ -26,15 +26,16 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 """The functions that make manoeuvres, by the manoeuvres' names."""
 
 GIVEN = ("speed", "to_speed", "steer", "key")
-"""What every manoeuvre is given as such; it is no option."""
+"""The arguments that are set for every manoeuvre and are not options."""
 
 
 def manoeuvre_options(name: str) -> dict[str, Any]:
-    """The options of a manoeuvre by name, and their defaults (None where it follows from the others).
+    """The options of a manoeuvre by name, and their defaults (None if the value follows from the others).
 
-    A driver on a path has those of `PathDriver` too. Units are those that the manoeuvre's function names.
+    A closed-loop manoeuvre on a path also has those of `PathDriver`. Units are those in the docstring of the
+    manoeuvre's function.
 
-    **Raises** `InputError` for another name, listing those there are.
+    **Raises** `InputError` for an unknown name, with a list of the known ones.
     """
     check_one_of("manoeuvre", name, FUNCTIONS)
     parameters = inspect.signature(FUNCTIONS[name]).parameters.values()
@@ -49,7 +50,7 @@ def manoeuvre_options(name: str) -> dict[str, Any]:
 
 
 def check_options(name: str, options: Iterable[str]) -> None:
-    """Raise `InputError` for an option that the manoeuvre has not, listing those it has."""
+    """Raise `InputError` for an option that the manoeuvre does not have, with a list of those that it has."""
     known = manoeuvre_options(name)
     unknown = [option for option in options if option not in known]
     if unknown:

@@ -1,4 +1,4 @@
-"""A driver who looks ahead on a path and steers for the point that he sees."""
+"""A driver with preview, who steers towards a point ahead on the path."""
 
 from __future__ import annotations
 
@@ -23,28 +23,27 @@ _CRAWL = 1.0
 
 
 class PathDriver(AbstractDriver):
-    """Single-point preview: he turns the wheel until the arc on which the car runs meets the path's point ahead.
+    """A driver with single-point preview, who turns the wheel until the arc of the car meets the path's point ahead.
 
-    Seen along the car's course (yaw + sideslip angle), the path's point at the distance v_x T_p is (ahead, left). The
-    arc to it has the curvature kappa, the one on which the car runs kappa_now, and the wheel turns at the rate
+    In axes along the car's course (yaw + sideslip), the path's point at the distance v_x T_p is (ahead, left). The arc to it has
+    the curvature kappa, the arc of the car has kappa_now, and the wheel turns at the rate
 
         kappa = 2 left / (ahead^2 + left^2),   kappa_now = yaw_rate / v_x,
         d steer/dt = gain (wheelbase + understeer_gradient v_x^2) (kappa - kappa_now) / reaction_lag.
 
-    For small angles `kappa v_x^2` is the acceleration that takes a point mass to the path after T_p: MacAdam's optimal
-    preview (C. C. MacAdam, J. Dyn. Syst. Meas. Control 102 (1980)) with all weight on one point. Because kappa_now is
-    seen and not computed from the steer, a car of another understeer than he thinks is held to the path as well. Steer
-    and its rate stay within `steer_limit` and `rate_limit` with smooth corners. Nothing of the future is used but the
-    path. For driving forwards.
+    For small angles `kappa v_x^2` is the acceleration that takes a point mass to the path after T_p: MacAdam's optimal preview
+    (C. C. MacAdam, J. Dyn. Syst. Meas. Control 102 (1980)) with all weight on one point. Because kappa_now is measured and not
+    computed from the steer, a car whose understeer gradient differs from `understeer_gradient` also stays on the path. Steer and
+    its rate stay within `steer_limit` and `rate_limit` with smooth corners. Of the future, only the path is used.
+    The driver is for driving forwards.
 
-    **Parameters**: `preview_time` T_p (s), `reaction_lag` (s), `wheelbase` (m), `understeer_gradient` (rad s^2/m, the
-    steer at the road wheels that a lateral acceleration of 1 m/s^2 needs beyond the geometric one), `gain` (-; below 0.8
-    or with a lag above 0.15 s he weaves at speed),
-    `steer_limit` (rad), `rate_limit` (rad/s), `shortest_preview` (m, at standstill).
+    **Parameters**: `preview_time` T_p (s), `reaction_lag` (s), `wheelbase` (m), `understeer_gradient` (rad s^2/m, the steer at
+    the road wheels beyond the geometric one for a lateral acceleration of 1 m/s^2), `gain` (-; below 0.8, or with a lag above
+    0.15 s, the car weaves at high speed), `steer_limit` (rad), `rate_limit` (rad/s), `shortest_preview` (m, at standstill).
 
-    **State**: `steer` (rad at the road wheels). **Inputs**: `steer`, and `v_x`, `v_x_rate` of the wanted `speed`.
+    **State**: `steer` (rad at the road wheels). **Inputs**: `steer`, and `v_x`, `v_x_rate` of the demanded `speed`.
 
-    **Raises** `InputError` for parameters out of range, a path or a speed that is none.
+    **Raises** `InputError` for parameters out of range, or if path or speed are of another type.
     """
 
     path: AbstractPath
@@ -74,7 +73,7 @@ class PathDriver(AbstractDriver):
         return self.gain / self.reaction_lag
 
     def start(self, t: Any, motion: Motion) -> Any:
-        """The steer that the arc to the point ahead needs in steady state."""
+        """The state with the steer of the arc to the point ahead in steady state."""
         curvature, needed = self._arc(motion)
         return driver_state(self.state_names)(self._limit(needed * curvature))
 
@@ -91,7 +90,7 @@ class PathDriver(AbstractDriver):
         return driver_state(self.state_names)(smooth_clip(rate, -self.rate_limit, self.rate_limit, self.rate_limit / 8))
 
     def _arc(self, motion: Motion) -> tuple[jax.Array, jax.Array]:
-        """The curvature of the arc to the point ahead (1/m), and the steer that a curvature needs (rad m)."""
+        """The curvature of the arc to the point ahead (1/m), and the steer per curvature in steady state (rad m)."""
         course = motion.yaw + numerics.arctan2(motion.v_y, regularised_speed(motion.v_x, _CRAWL))
         distance = numerics.hypot(self.preview_time * motion.v_x, self.shortest_preview)
         target = self.path.preview(motion.x, motion.y, course, distance)

@@ -1,4 +1,4 @@
-"""Paths on the ground that a driver follows."""
+"""Paths on the ground for a driver to follow."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ from jaxveh.numerics import smooth_step
 
 
 class PathTarget(NamedTuple):
-    """A point of the path seen from a car: `ahead` and `left` of it, m."""
+    """A point of the path relative to a car: `ahead` and `left` of it, m."""
 
     ahead: Any
     left: Any
 
 
 class Beside(NamedTuple):
-    """A place seen from the path: how far `left` of it (m), and the path's `heading` there (rad, left of the x axis)."""
+    """A place relative to the path: its distance `left` of the path (m), and the path's `heading` there (rad, left of
+    the x axis)."""
 
     left: Any
     heading: Any
 
 
 class AbstractPath(eqx.Module):
-    """A smooth curve on the ground, through the world's origin along x unless it says otherwise; elementwise.
+    """A smooth curve on the ground, through the world's origin along x unless stated otherwise; elementwise.
 
     **Raises** `InputError` for parameters outside their domain.
     """
@@ -41,27 +42,27 @@ class AbstractPath(eqx.Module):
 
     @abc.abstractmethod
     def beside(self, x: Any, y: Any) -> Beside:
-        """Where the place (x, y) (m) is, seen from the path."""
+        """The place (x, y) (m) relative to the path."""
 
     @abc.abstractmethod
     def preview(self, x: Any, y: Any, direction: Any, distance: Any) -> PathTarget:
-        """The path's point `distance` (m) further on, seen from the place (x, y) (m) in a `direction` (rad)."""
+        """The path's point `distance` (m) further on, relative to the place (x, y) (m) and a `direction` (rad)."""
 
 
 class AbstractGraph(AbstractPath):
-    """A path that says how far left it is at each x: `y(x)`, twice continuously differentiable."""
+    """A path given by its lateral position at each x: `y(x)`, twice continuously differentiable."""
 
     @abc.abstractmethod
     def y(self, x: jax.Array) -> jax.Array:
-        """How far left of the x axis the path is, m, in the shape of x (m)."""
+        """The distance of the path to the left of the x axis, m, in the shape of x (m)."""
 
     def beside(self, x: Any, y: Any) -> Beside:
-        """To the first order in the distance from the path."""
+        """The place relative to the path, to first order in the distance from the path."""
         here, slope = self._slope(x)
         return Beside((y - here) * _cosine(slope), numerics.arctan(slope))
 
     def preview(self, x: Any, y: Any, direction: Any, distance: Any) -> PathTarget:
-        """The distance is counted along the path's tangent beside the place."""
+        """The point ahead; the distance is taken along the path's tangent beside the place."""
         _, slope = self._slope(x)
         along = distance * _cosine(slope)
         across = self.y(x + along) - y
@@ -82,7 +83,7 @@ def _rotate(along, across, direction) -> PathTarget:
 
 
 class Straight(AbstractGraph):
-    """A straight line along x, `left` (m, default 0) of the x axis."""
+    """A straight line along x, at a distance `left` (m, default 0) to the left of the x axis."""
 
     left: jax.Array = parameter("m", scale=1.0, default=0.0)
 
@@ -91,7 +92,7 @@ class Straight(AbstractGraph):
 
 
 class LaneChanges(AbstractGraph):
-    """To another lane and back: a smooth step of `over` (m, left) and another of `back` (m, left; negative: right).
+    """A path to another lane and back: a smooth step of `over` (m, left) and another of `back` (m, left; negative: right).
 
     `over_from`, `over_to`, `back_from`, `back_to` (m): the x at which the steps begin and end.
 
@@ -106,7 +107,7 @@ class LaneChanges(AbstractGraph):
     back_to: jax.Array = parameter("m", scale=10.0)
 
     def __check_init__(self):
-        check_parameters(self)  # first, so that what is not finite is named itself
+        check_parameters(self)  # first, so that the message names a field that is not finite
         check_positive("LaneChanges.over_to - over_from", self.over_to - self.over_from, "m")
         check_positive("LaneChanges.back_to - back_from", self.back_to - self.back_from, "m")
 
@@ -119,8 +120,9 @@ class LaneChanges(AbstractGraph):
 class Sine(AbstractGraph):
     """A sine of `amplitude` (m, left first) and `wavelength` (m) from `start` (m) on, over `periods` wavelengths.
 
-    It fades in over the first half wavelength and out over the last, where its first and its last peak have half the amplitude:
-    with a slalom's cones at the peaks between them, half a wavelength apart, the path passes them on alternating sides.
+    It fades in over the first half wavelength and out over the last, so that its first and its last peak have half the
+    amplitude. The cones of a slalom stand at the peaks between these, half a wavelength apart, so that the path passes
+    them on alternating sides.
 
     **Raises** `InputError` for a wavelength that is not positive, or less than one period.
     """
@@ -131,7 +133,7 @@ class Sine(AbstractGraph):
     periods: jax.Array = positive("-", default=3.0)
 
     def __check_init__(self):
-        check("Sine.periods", self.periods, lambda v: v >= 1, "at least 1, for its ends to fade")
+        check("Sine.periods", self.periods, lambda v: v >= 1, "at least 1, so that its ends can fade")
 
     def y(self, x: jax.Array) -> jax.Array:
         gone = jnp.clip((x - self.start) / self.wavelength, 0.0, self.periods)
@@ -155,7 +157,7 @@ class Circle(AbstractPath):
         return Beside(self.radius - jnp.sign(self.radius) * away, numerics.arctan2(sine, cosine))
 
     def preview(self, x: Any, y: Any, direction: Any, distance: Any) -> PathTarget:
-        """The distance is counted along the circle from the point nearest to the place."""
+        """The point ahead; the distance is taken along the circle from the point nearest to the place."""
         sine, cosine, _ = self._angle(x, y)
         further = distance / self.radius
         turn_sine, turn_cosine = numerics.sin(further), numerics.cos(further)
@@ -167,6 +169,6 @@ class Circle(AbstractPath):
         """Sine and cosine of the path's heading at the nearest point, and the distance from the centre."""
         from_centre = y - self.radius
         away = numerics.hypot(x, from_centre)
-        # In the centre itself every point is as near: any will do.
+        # At the centre all points are equally near: one of them is taken.
         scale = jnp.sign(self.radius) / jnp.where(away > 0, away, 1.0)
         return x * scale, jnp.where(away > 0, -from_centre * scale, 1.0), away

@@ -14,7 +14,7 @@ from jaxveh.numerics import band_harmonics, sum_of_harmonics
 
 
 class RandomSteering(AbstractSteering):
-    """Steer that is random, white between two frequencies, at a constant speed, with smooth edges at both ends.
+    """Random steer at a constant speed, white between two frequencies, with smooth edges at both ends.
 
     `steer` (rad) is its standard deviation; `frequencies` (Hz) and `phases` (rad) are those of its harmonics, (n,).
     """
@@ -35,8 +35,9 @@ def random_steering(
 ) -> RandomSteering:  # fmt: skip
     """Random steer of standard deviation `steer` (rad at the road wheels) at `speed` (m/s) (ISO 7401, random input).
 
-    White between the frequencies `lowest` and `highest` (Hz), as `count` harmonics of equal amplitude, one at a random
-    place in each equal part of the band, with random phases from `key`. `edge` (s): smooth fades at both ends.
+    The steer is white between the frequencies `lowest` and `highest` (Hz): `count` harmonics of equal amplitude, each
+    with a random frequency in its own equal part of the band and a random phase, drawn from `key`. `edge` (s): length
+    of the smooth fades at both ends.
 
     **Raises** `InputError` for values out of range.
     """

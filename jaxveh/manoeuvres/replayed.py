@@ -17,7 +17,7 @@ from jaxveh.vehicles import kit
 
 
 class Replay(AbstractManoeuvre):
-    """Recorded channels, linear between the rows and held at the ends; t counts from the first row.
+    """Recorded channels as inputs, linear between the rows and constant beyond the ends; t is the time from the first row.
 
     `time` and each of `values` are (T,); `names` are the fields of the inputs.
     """
@@ -37,11 +37,11 @@ class Replay(AbstractManoeuvre):
 
 
 def replay(recording: Recording, channels: tuple[str, ...] | None = None) -> Replay:
-    """Replay the inputs of a recording: `channels`, by default `steer`, `v_x` and, where there are any, `a_x`, `steer_rear` and
-    `steer_fl` ... of cars that steer other wheels, too.
+    """Replay the inputs of a recording: `channels`, by default `steer`, `v_x` and, if the recording has them, `a_x`,
+    and `steer_rear` and `steer_fl` ... of cars that also steer other wheels.
 
-    **Raises** `InputError` for a missing channel, fewer than two rows, or a channel that is not finite throughout
-    (host side: fill its gaps first).
+    **Raises** `InputError` for a missing channel, fewer than two rows, or a channel that is not finite throughout (fill
+    its gaps first; checked outside jit).
     """
     if channels is None:
         more = ("a_x", *(name for name in kit.STEER_UNITS if name != "steer"))
@@ -50,12 +50,12 @@ def replay(recording: Recording, channels: tuple[str, ...] | None = None) -> Rep
     if len(recording) < 2:
         raise InputError(f"replay: the recording has {len(recording)} row(s); at least 2 are needed.")
     if not is_concrete(recording.time):
-        raise InputError("replay: the recording's time is traced; make the replay outside jit, it sets the duration.")
+        raise InputError("replay: the recording's time is traced; make the replay outside jit (it sets the duration).")
     for name in channels:
         _check_finite(recording, name)
     values = tuple(jnp.asarray(recording[name]) for name in channels)
     stamps = np.asarray(recording.time, dtype=np.float64)
-    # Counted from the first row before rounding, so that float32 keeps the steps of a long log.
+    # The time of the first row is subtracted before rounding, so that float32 resolves the steps of a long recording.
     time = jnp.asarray(stamps - stamps[0], values[0].dtype)
     return Replay(duration=float(stamps[-1] - stamps[0]), time=time, values=values, names=tuple(channels))
 

@@ -1,4 +1,4 @@
-"""A foot on the pedals: torques that hold a car at the speed that its driver wants."""
+"""Speed control by the pedals: torques that make a car follow the driver's demanded speed."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ from jaxveh.numerics import smooth_clip, smooth_ramp, smooth_step
 from jaxveh.vehicles import GRAVITY, kit
 
 AIR_DENSITY = 1.2
-"""kg/m^3, at 20 degrees Celsius near sea level."""
+"""The density of air, kg/m^3, at 20 degrees Celsius near sea level."""
 
 _EDGE = 0.1
-"""Over which drive turns into brake and limits round off, m/s^2."""
+"""The width of the smooth transition from drive to brake and of the rounded limits, m/s^2."""
 
 _CRAWL = 0.5
-"""Below this speed (m/s) the rolling resistance that is allowed for fades to zero."""
+"""Below this speed (m/s) the compensated rolling resistance fades to zero."""
 
 
 class SpeedControl(AbstractDriver):
-    """A driver's (or a manoeuvre's) steering, and pedals that make the car follow the speed that he wants.
+    """The steering of a driver or a manoeuvre, with pedals that make the car follow its demanded speed.
 
-    The wanted acceleration is `v_x_rate + gain e + integral`, `e = v_x - motion.v_x` and `d integral/dt = gain e /
-    integral_time`; the force is `mass` times it, and what air and rolling take. It is held within `drive_limit` and
-    `brake_limit` with smooth corners; while they hold it the integral stands still (conditional integration, K. J.
-    Astrom and T. Hagglund, Advanced PID Control, sec. 3.5), so that it does not wind up. Positive force becomes
-    `drive_torque`, negative `brake_torque` (N m, total at the wheels, never negative; both are there within 0.1 m/s^2
-    of zero, smoothly). What the wrapped driver does with the pedals himself is added.
+    The demanded acceleration is `v_x_rate + gain e + integral`, with `e = v_x - motion.v_x` and
+    `d integral/dt = gain e / integral_time`. The force is `mass` times this acceleration, plus air drag and rolling resistance.
+    It is limited to `drive_limit` and `brake_limit` with smooth corners; while a limit acts, the integral is constant
+    (conditional integration, K. J. Astrom and T. Hagglund, Advanced PID Control, sec. 3.5), so that it does not wind up. A
+    positive force becomes `drive_torque`, a negative one `brake_torque` (N m, total at the wheels, never negative; within 0.1
+    m/s^2 of zero both are positive, for a smooth transition). The pedals of the wrapped driver are added.
 
     **Parameters**: `mass` (kg), `wheel_radius` (m), `gain` (1/s), `integral_time` (s), `drag_area` (m^2: drag
     coefficient times area), `rolling_resistance` (-), `drive_limit` and `brake_limit` (m/s^2).
 
     **States**: those of the driver, and `speed_integral` (m/s^2).
 
-    **Raises** `InputError` for parameters that are not positive, a driver that is none, or one that wants no speed.
+    **Raises** `InputError` for parameters that are not positive, for `driver` of another type, or a driver without `v_x`.
     """
 
     driver: AbstractDriver
@@ -80,7 +80,7 @@ class SpeedControl(AbstractDriver):
         return driver_state(self.state_names)(*self.driver.start(t, motion), 0.0 * motion.v_x)
 
     def inputs(self, t: Any, motion: Motion, state: Any) -> Any:
-        """`PedalInputs`; of a driver who says the angles of other wheels (`steer_rear`, `steer_fl` ...) these, too."""
+        """The `PedalInputs`; if the driver gives angles of other wheels (`steer_rear`, `steer_fl` ...), these are included."""
         u, wanted, _ = self._pedal_inputs(t, motion, state)
         own = getattr(u, "drive_torque", 0.0) - getattr(u, "brake_torque", 0.0)
         torque, edge = self.mass * self.wheel_radius * wanted + own, self.mass * self.wheel_radius * _EDGE
@@ -97,10 +97,10 @@ class SpeedControl(AbstractDriver):
         return driver_state(self.state_names)(*self.driver.derivatives(t, motion, self._inner(state)), rate)
 
     def _pedal_inputs(self, t, motion, state):
-        """The driver's inputs, the acceleration that the pedals give, and how much of it the limits add."""
+        """The driver's inputs, the acceleration by the pedals after the limits, and the part of it that the limits add."""
         u = self.driver.inputs(t, motion, self._inner(state))
         if not hasattr(u, "v_x"):
-            raise InputError(f"SpeedControl: the driver gives {', '.join(u._fields)}, and no v_x to follow.")
+            raise InputError(f"SpeedControl: the driver gives {', '.join(u._fields)}, but no v_x to follow.")
         v = motion.v_x
         resistance = GRAVITY * self.rolling_resistance * v / numerics.hypot(v, _CRAWL)
         drag = 0.5 * AIR_DENSITY * self.drag_area * v * abs(v) / self.mass

@@ -1,4 +1,4 @@
-"""Speeds over time that a driver wants to drive."""
+"""Demanded speeds over time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from jaxveh.numerics import gauss_markov_harmonics, smooth_ramp, sum_of_harmonic
 
 
 class AbstractSpeed(eqx.Module):
-    """A smooth function of time, its array leaves are its parameters.
+    """A demanded speed as a smooth function of time; array leaves are its parameters.
 
     **Raises** `InputError` for parameters outside their domain.
     """
@@ -26,7 +26,7 @@ class AbstractSpeed(eqx.Module):
 
     @abc.abstractmethod
     def v_x(self, t: Any) -> jax.Array:
-        """The speed at the times t (s), m/s, in their shape."""
+        """The speed at the times t (s), m/s, in the shape of t."""
 
     def at(self, t: Any) -> tuple[jax.Array, jax.Array]:
         """The speed (m/s) and its rate (m/s^2) at the times t (s)."""
@@ -35,7 +35,7 @@ class AbstractSpeed(eqx.Module):
 
 
 class SteadySpeed(AbstractSpeed):
-    """One `speed` (m/s). **Raises** `InputError` for a negative one."""
+    """A constant `speed` (m/s). **Raises** `InputError` for a negative speed."""
 
     speed: jax.Array = parameter("m/s", scale=20.0)
 
@@ -49,8 +49,8 @@ class SteadySpeed(AbstractSpeed):
 class ChangingSpeed(AbstractSpeed):
     """A speed that changes linearly from one value to another, with rounded corners.
 
-    `before`, `after` (m/s), `start` (s): where the change begins, `time` (s): how long it takes, `edge` (s, default 1):
-    over which the corners are rounded.
+    `before`, `after` (m/s): the two speeds; `start` (s): the time at which the change begins; `time` (s): its length;
+    `edge` (s, default 1): the time over which the corners are rounded.
 
     **Raises** `InputError` for negative speeds, or times that are not positive.
     """
@@ -75,9 +75,9 @@ class ChangingSpeed(AbstractSpeed):
 
 
 class WaveringSpeed(AbstractSpeed):
-    """A speed that wavers at random about its mean: harmonics of equal energy (`wavering_speed` draws them).
+    """A speed that varies randomly about its mean, as harmonics of equal energy (drawn by `wavering_speed`).
 
-    `mean`, `std` (m/s), `frequencies` (Hz) and `phases` (rad), (n,) each. It does not fall below zero.
+    `mean`, `std` (m/s), `frequencies` (Hz) and `phases` (rad), (n,) each. The speed does not fall below zero.
     """
 
     mean: jax.Array = parameter("m/s", scale=20.0)
@@ -93,9 +93,9 @@ class WaveringSpeed(AbstractSpeed):
 def wavering_speed(
     mean, std, key: jax.Array, *, time: float = 10.0, fastest: float = 5.0, count: int = 40
 ) -> WaveringSpeed:
-    """A speed about `mean` with the standard deviation `std` (m/s): Gauss-Markov of correlation `time` (s).
+    """A speed about `mean` with the standard deviation `std` (m/s): a Gauss-Markov process with the correlation time `time` (s).
 
-    Nothing is faster than one swing in `fastest` (s), so that it can be driven. One `key` gives one drive.
+    It has no periods shorter than `fastest` (s), so that a car can follow it. The `key` determines the speed.
 
     **Raises** `InputError` for values out of range.
     """

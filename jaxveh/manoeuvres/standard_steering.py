@@ -1,6 +1,6 @@
-"""Open-loop steering of the standards at constant speed: sine with dwell, ramp, slalom.
+"""Open-loop steering at constant speed, as in standards: sine with dwell, ramp, slalom.
 
-All are three times continuously differentiable in time: corners of a shape are rounded within an `edge`.
+All of them are three times continuously differentiable in time: the corners of a shape are rounded over an `edge`.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from jaxveh.numerics import smooth_ramp
 
 
 class AbstractRounded(AbstractSteering):
-    """Steering from `start` (s) on, whose corners are rounded over `edge` (s)."""
+    """Steering from `start` (s) on, with corners rounded over `edge` (s)."""
 
     _: KW_ONLY
     edge: float = eqx.field(static=True)
     start: float = eqx.field(static=True)
 
     def since(self, t: jax.Array, begin: float) -> jax.Array:
-        """The time since `begin` (s), zero before, with the corner rounded."""
+        """The time since `begin` (s), zero before it, with a rounded corner."""
         return smooth_ramp(t - begin, self.edge / 2)
 
 
 class SineWithDwell(AbstractRounded):
     """One sine period of steer whose second peak is held for a while (FMVSS 126: 49 CFR 571.126, S7.9).
 
-    The sine's phase runs at its frequency, stands still during the dwell, and starts and stops smoothly within `edge`,
-    half of it before and half after, so that the quarters keep their times.
+    The phase of the sine runs at its frequency and stands still during the dwell. It starts and stops smoothly within
+    `edge`, half of it before and half of it after the corner, so that the quarters of the sine keep their lengths.
     """
 
     _: KW_ONLY
@@ -48,7 +48,7 @@ class SineWithDwell(AbstractRounded):
 
 
 class RampSteer(AbstractRounded):
-    """Steer that grows linearly from `start` for `rise` and is then held (ISO 4138, constant speed, variable steer)."""
+    """Steer that grows linearly over `rise` from `start` on and is then constant (ISO 4138, constant speed, variable steer)."""
 
     _: KW_ONLY
     rise: float = eqx.field(static=True)
@@ -59,7 +59,7 @@ class RampSteer(AbstractRounded):
 
 
 class Slalom(AbstractRounded):
-    """A number of sine periods of steer, as between cones."""
+    """A number of sine periods of steer, as in a slalom between cones."""
 
     _: KW_ONLY
     frequency: float = eqx.field(static=True)
@@ -83,12 +83,12 @@ def sine_with_dwell(
     """The sine with dwell of FMVSS 126 at `speed` (m/s): peaks of `steer` and minus `steer` (rad at the road wheels).
 
     A sine of 0.7 Hz from `start` (s) on, a `dwell` of 0.5 s at its second peak (after three quarters), then its last
-    quarter (49 CFR 571.126, S7.9; speed 80 km/h, steer there in multiples of the steering wheel's angle at 0.3 g).
-    `edge` (s): over which the phase starts and stops; of the dwell, `dwell - edge` is exact and the rest within
-    2e-4 of the peak at the default values.
+    quarter (49 CFR 571.126, S7.9; there the speed is 80 km/h, and the steer is in multiples of the steering wheel's
+    angle at 0.3 g). `edge` (s): the time over which the phase starts and stops. During `dwell - edge` of the dwell the
+    steer is exactly at the peak, and during the rest within 2e-4 of it at the default values.
 
-    The standard lets the car coast (S7.9); here a constant speed is asked for, which `simulate` holds by a driver with pedals
-    (`SpeedControl`) in a car under torques.
+    In the standard the car coasts (S7.9). Here the demanded speed is constant; for a car driven by torques, `simulate`
+    holds it by a driver with pedals (`SpeedControl`).
 
     **Raises** `InputError` for values out of range, or a sine that does not end within the duration.
     """
@@ -107,10 +107,11 @@ def sine_with_dwell(
 def ramp_steer(
     speed, steer, *, rise: float = 20.0, edge: float = 0.5, start: float = 1.0, duration: float | None = None
 ) -> RampSteer:
-    """Steer that grows at a constant rate to `steer` (rad at the road wheels) at `speed` (m/s), then is held.
+    """Steer that grows at a constant rate to `steer` (rad at the road wheels) at `speed` (m/s) and is then constant.
 
-    `rise` (s): how long it grows from `start` (s) on; slow enough, the car is in steady state throughout (ISO 4138,
-    constant speed with variable steer). `duration` (s): by default until 2 s after the end.
+    `rise` (s): the time over which it grows, from `start` (s) on; if it is long enough, the car is in steady state
+    throughout (ISO 4138, constant speed with variable steer). `edge` (s, over which corners are rounded). `duration`
+    (s): by default until 2 s after the end.
 
     **Raises** `InputError` for values out of range, or a ramp that does not end within the duration.
     """
@@ -131,8 +132,9 @@ def slalom(
 ) -> Slalom:  # fmt: skip
     """Sine periods of steer with peaks of `steer` (rad at the road wheels) at `speed` (m/s), open loop.
 
-    `frequency` (Hz), `periods`: how many, from `start` (s) on; between cones a distance d apart the frequency is
-    `speed / (2 d)`. `duration` (s): by default until 1 s after the end. In closed loop: `slalom_course`.
+    `frequency` (Hz); `periods`: their number, from `start` (s) on. For cones at a distance d from each other the
+    frequency is `speed / (2 d)`. `edge` (s, over which the phase starts and stops). `duration` (s): by default until 1
+    s after the end. For a slalom in closed loop see `slalom_course`.
 
     **Raises** `InputError` for values out of range, or periods that do not end within the duration.
     """
@@ -150,6 +152,6 @@ def slalom(
 
 
 def _check_edge(edge: float, start: float, most: float) -> None:
-    check_positive("edge", edge, "s", "A corner without an edge has no derivative; 0.01 s is a sharp one.")
-    check("edge", edge, lambda v: v <= most, f"at most {most:g} s, what it stands in")
-    check_at_least("start", start, edge / 2, "The first edge begins half of it before the start.")
+    check_positive("edge", edge, "s", "A corner without an edge has no derivative; for a sharp one use 0.01 s.")
+    check("edge", edge, lambda v: v <= most, f"at most {most:g} s, the part of the shape that contains it")
+    check_at_least("start", start, edge / 2, "The first edge begins edge / 2 before the start.")

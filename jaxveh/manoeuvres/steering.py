@@ -1,4 +1,4 @@
-"""Open-loop steering at constant speed. Every shape is twice continuously differentiable in time."""
+"""Open-loop steering at constant speed; all shapes are twice continuously differentiable in time."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ class DoubleLaneChange(AbstractSteering):
         return self._change(t, self.start) - self._change(t, back)
 
     def _change(self, t, start):
-        # Outside its window the sine is held: far arguments cost accuracy in float32.
+        # Outside its window the sine's argument is held: large arguments lose accuracy in float32.
         inside = jnp.clip(t - start, 0.0, self.period)
         fade = window(t, start, start + self.period, self.period / 8)
         return numerics.sin(inside * (2 * math.pi / self.period)) * fade
 
 
 class StepSteer(AbstractSteering):
-    """Straight until `start`, then a smooth ramp of length `ramp` to a constant `steer`."""
+    """Straight ahead until `start`, then a smooth ramp of length `ramp` to a constant `steer`."""
 
     _: KW_ONLY
     ramp: float = eqx.field(static=True)
@@ -68,9 +68,9 @@ def double_lane_change(
 ) -> DoubleLaneChange:
     """A double lane change at `speed` (m/s) with steer peaks of plus and minus `steer` (rad at the road wheels).
 
-    Straight until `start`, one sine `period` (left first for positive steer), a `pause`, the mirrored period, and
-    straight until `duration` (all in s). The paper of Bao, Sabbioni et al. (2015) shows no steering trace: the shape
-    is ours.
+    The car drives straight ahead until `start`; then follow one sine `period` (left first for positive steer), a
+    `pause` and the mirrored period, and it drives straight ahead until `duration` (all in s). The paper of Bao,
+    Sabbioni et al. (2015) shows no steering trace: the shape is our choice.
 
     **Raises** `InputError` for values out of range, or where the two periods do not fit into the duration.
     """
@@ -86,13 +86,14 @@ def double_lane_change(
 
 
 def step_steer(speed, steer, *, ramp: float = 0.2, start: float = 1.0, duration: float = 7.0) -> StepSteer:
-    """A steer step to `steer` (rad at the road wheels) at `speed` (m/s): straight, a smooth `ramp` (s), then held.
+    """A steer step to `steer` (rad at the road wheels) at `speed` (m/s): straight ahead until `start`, a smooth `ramp`
+    (s), then constant steer.
 
     **Raises** `InputError` for values out of range, or where the ramp does not end within the duration.
     """
     check_drive(speed, duration, steer)
     check_at_least("start", start, 0.0)
-    check_positive("ramp", ramp, "s", "A step without a ramp has no derivative; 0.01 s is a sharp one.")
+    check_positive("ramp", ramp, "s", "A step without a ramp has no derivative; for a sharp one use 0.01 s.")
     check("duration", duration, lambda d: d >= start + ramp, f"at least start + ramp = {start + ramp:g} s")
     return StepSteer(duration=float(duration), speed=speed, steer=steer, ramp=float(ramp), start=float(start))
 
@@ -106,11 +107,11 @@ def swept_sine(
     *,
     edge: float = 0.5,
 ) -> SweptSine:
-    """A steer sine of amplitude `steer` (rad at the road wheels) at `speed` (m/s), its frequency (Hz) rising linearly.
+    """A sine steer of amplitude `steer` (rad at the road wheels) at `speed` (m/s) with a linearly rising frequency.
 
-    `edge` (s): length of the smooth fades at both ends.
+    `from_frequency` (Hz, at the start), `to_frequency` (Hz, at the end), `edge` (s): length of the smooth fades at both ends.
 
-    **Raises** `InputError` for values out of range, or edges that fill more than the duration.
+    **Raises** `InputError` for values out of range, or edges that together are longer than the duration.
     """
     check_drive(speed, duration, steer)
     check_positive("from_frequency", from_frequency, "Hz")

@@ -1,4 +1,4 @@
-"""What is usual of a named manoeuvre where nobody says otherwise, and what it wants of the car that drives it."""
+"""Typical speeds and steer angles of named manoeuvres, and options that follow from the car."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ KMH = 1 / 3.6
 
 
 class UsualDrive(NamedTuple):
-    """Speed (m/s) and steer (degrees at the road wheels)."""
+    """Typical speed (m/s) and steer (degrees at the road wheels) of a manoeuvre."""
 
     speed: float
     steer_deg: float
@@ -33,12 +33,12 @@ USUAL: dict[str, UsualDrive] = {
     "slalom-course": UsualDrive(14.0, 0.0),
     "steady-circle": UsualDrive(16.0, 0.0),
 }
-"""What is usual of each manoeuvre, by its name in `MANOEUVRES`."""
+"""Typical speed and steer of each manoeuvre, by its name in `MANOEUVRES`."""
 
 
 def options_of_car(name: str, car: Any) -> dict[str, float]:
-    """What the manoeuvre `name` would have to be told of the car: its mass and wheels where it brakes, its axles and how much it
-    understeers where a driver follows a path."""
+    """The options of the manoeuvre `name` that follow from the car: mass and wheel radius for braking, wheelbase and
+    understeer gradient for a driver on a path."""
     known = manoeuvre_options(name)
     found = {part: getattr(car, part, None) for part in ("mass", "wheel_radius")}
     if hasattr(car, "front_axle_to_cg") and hasattr(car, "rear_axle_to_cg"):
@@ -49,7 +49,7 @@ def options_of_car(name: str, car: Any) -> dict[str, float]:
 
 
 def understeer_of(car: Any) -> Any:
-    """Understeer gradient of the car on its tyres' slopes, rad s^2/m; None for a car without tyres."""
+    """The understeer gradient of the car with its tyres' linear slopes, rad s^2/m; None for a car without tyres."""
     if isinstance(car, vehicles.LinearSingleTrack):
         return car.understeer_gradient
     return vehicles.linear_single_track(car).understeer_gradient if hasattr(car, "front") else None

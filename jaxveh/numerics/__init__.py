@@ -1,6 +1,6 @@
-"""Atoms on plain arrays: elementary functions, random numbers, resampling, small matrices.
+"""Basic functions of plain arrays: elementary functions, random numbers, resampling, small matrices.
 
-All are safe to jit, batch and differentiate.
+All of them can be jitted, batched and differentiated.
 """
 
 from jaxveh.numerics import polynomials, sigma_points

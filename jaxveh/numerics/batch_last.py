@@ -1,11 +1,12 @@
-"""The results of a program for a batch whose axis is the last one of every array, along which XLA's loops then run.
+"""Evaluates a program for a batch whose axis is the last axis of every array, so that XLA's loops run along the batch.
 
-Under `jax.vmap` a batch stands first, and XLA on the CPU takes its small matrices one by one: sums over 11 numbers are short
-loops, and each Cholesky factor is a call of LAPACK. What `written_out` does for few states in scalars would take too long to
-compile for more. A batch of unscented filters of 11 states takes a sixth of the time (1.5 instead of 9.5 us a run-step, jax 0.12,
-float64).
+Under `jax.vmap` the batch is the first axis, and XLA on the CPU takes its small matrices one by one: sums over 11
+numbers are short loops, and each Cholesky factor is a call of LAPACK. The scalars of `written_out`, which serve for few
+states, would take too long to compile for more. A batch of unscented filters of 11 states takes a sixth of the time
+(1.5 instead of 9.5 us per run and step, jax 0.12, float64).
 
-A sum is a barrier: XLA would compute what it is made of once for each that reads it, as it does with no sum of its own.
+Each sum that is written out is followed by a barrier: otherwise XLA would compute its terms once for each use of the
+sum, which it does not do with its own reductions.
 """
 
 from __future__ import annotations
@@ -27,12 +28,12 @@ from jaxveh.numerics.written_out import CALLS, FENCES, alone
 
 
 def as_last(arrays: Sequence[Any], of_batch: Sequence[bool]) -> list:
-    """The arrays, those `of_batch` as `Last`."""
+    """The arrays, where those that are `of_batch` are wrapped as `Last`."""
     return [Last(one) if last else one for one, last in zip(arrays, of_batch, strict=True)]
 
 
 def evaluate(program: Any, operands: Sequence[Any], size: int) -> list:
-    """The results of a closed jaxpr for operands that are `Last`, or the same for the whole batch."""
+    """The results of a closed jaxpr; each operand is `Last`, or one value for the whole batch."""
     jaxpr = program.jaxpr if hasattr(program, "jaxpr") else program
     values: dict[Any, Any] = {}
     read = lambda one: np.asarray(one.val, one.aval.dtype) if isinstance(one, core.Literal) else values[one]
@@ -51,7 +52,7 @@ def evaluate(program: Any, operands: Sequence[Any], size: int) -> list:
 
 
 def _only_summed(jaxpr: Any) -> set:
-    """Variables that one sum reads, and nothing else."""
+    """The variables that are read by one sum and by nothing else."""
     readers: dict[Any, list] = {}
     for equation in jaxpr.eqns:
         for one in equation.invars:
@@ -96,7 +97,7 @@ def _results(equation: Any, operands: list, size: int) -> list:
 
 
 def _reduced(equation: Any, operand: Any) -> Any:
-    """A reduction, written out where it is of few terms."""
+    """A reduction, written out if it has few terms."""
     axes = tuple(equation.params["axes"])
     array = operand if isinstance(operand, Product) else operand.array
     if not axes:
@@ -117,23 +118,23 @@ def _variables(equation: Any, operands: list) -> dict[Any, Any]:
 
 
 def _for_all(equation: Any, operands: list) -> list:
-    """An equation of what is the same for the whole batch."""
+    """The results of an equation whose operands are the same for the whole batch."""
     values = _variables(equation, operands)
     return core.jaxpr_as_fun(alone(equation, list(values)))(*values.values())
 
 
 def _by_vmap(equation: Any, operands: list) -> list:
-    """An equation that nothing is known of here."""
+    """The results of an equation without a rule here, by `jax.vmap`."""
     values = _variables(equation, operands)
     axes = [-1 if isinstance(one, Last) else None for one in values.values()]
     arrays = [one.array if isinstance(one, Last) else one for one in values.values()]
-    # Else each number would be computed from the beginning, with all that it is made of.
+    # Without fences each number would be computed from the beginning, with everything that it depends on.
     found = jax.vmap(core.jaxpr_as_fun(alone(equation, list(values))), axes, -1)(*fence(arrays))
     return [Last(one) for one in fence(found)]
 
 
 def _branches(params: dict[str, Any], operands: list, out: list, size: int) -> list:
-    """A conditional of one predicate for the whole batch."""
+    """A conditional with one predicate for the whole batch."""
     index, *rest = operands
     of_batch = [isinstance(one, Last) for one in rest]
     arrays = [one.array if last else one for one, last in zip(rest, of_batch, strict=True)]
@@ -146,7 +147,7 @@ def _branches(params: dict[str, Any], operands: list, out: list, size: int) -> l
         return run
 
     branches, platforms = params["branches"], params.get("branches_platforms")
-    if platforms is not None:  # a choice by the platform, which is known
+    if platforms is not None:  # a choice by platform, which is known here
         here = "cpu" if on_cpu() else jax.default_backend()
         chosen = next(i for i, names in enumerate(platforms) if names is None or here in names)
         return [Last(one) for one in taken(branches[chosen])(*arrays)]

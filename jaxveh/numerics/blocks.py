@@ -16,19 +16,19 @@ from jaxveh.numerics.platform import on_cpu
 
 
 def sum_in_blocks(function: Callable[[Any, Any], Array], parameters: Any, rows: Any, *, block: int = 1000) -> Array:
-    """The sum of `function(parameters, rows)` over all rows, whose gradient is made block by block.
+    """The sum of `function(parameters, rows)` over all rows, with a gradient that is computed block by block.
 
     For fits to long tables, such as `sum_in_blocks(lambda tyre, rig: (tyre.forces(rig.contact).F_y - rig.F_y) ** 2, tyre, rig)`:
-    the value is what `jnp.sum(function(parameters, rows))` gives; its gradient takes about a third of the time on a CPU
-    and a fortieth of the memory (MF-Tyre 6.1 with all coefficients, 1e5 rows: 450 instead of 1620 ns a row with jax 0.12, 610
+    the value is that of `jnp.sum(function(parameters, rows))`; its gradient takes about a third of the time on a CPU and a
+    fortieth of the memory (MF-Tyre 6.1 with all coefficients, 1e5 rows: 450 instead of 1620 ns per row with jax 0.12, 610
     instead of 1650 with 0.10, where the forces alone take 120; 5 instead of 200 MB), because intermediate results stay in the
-    processor's cache and no parameter's slope is summed up number by number. It compiles longer (12 instead of 7 s).
+    processor's cache and slopes of parameters are not summed number by number. It takes longer to compile (12 instead of 7 s).
 
-    `function`: elementwise; arrays (n,) in, one array (n,) out. All that is differentiated must be an argument of it, nothing
-    in its closure. `parameters`: a pytree, such as a tyre; within a block its scalars come as arrays as long as the block.
-    `rows`: a pytree of arrays (n,), and of scalars that hold for every row. `block`: rows at a time on a CPU; an accelerator
-    takes all at once. The result is a scalar. Both modes of differentiation and higher orders work, and so does `jax.vmap`;
-    the gradient with respect to rows is made only where it is asked for.
+    `function`: elementwise; arrays (n,) in, one array (n,) out. Everything that is differentiated must be an argument of it, not
+    in its closure. `parameters`: a pytree, such as a tyre; within a block its scalars are arrays as long as the block. `rows`: a
+    pytree of arrays (n,), and of scalars that are the same for all rows. `block`: the number of rows at a time on a CPU; an
+    accelerator takes all at once. The result is a scalar. Both modes of differentiation and higher orders work, and so does
+    `jax.vmap`; the gradient with respect to rows is computed only if it is needed.
 
     **Raises** `InputError` for a block of less than one row, or rows that are not arrays of one length.
     """
@@ -65,7 +65,7 @@ def _with_gradient(law, primal: list, chosen: list[int], tabled: list[bool], blo
     rows = next(len(leaf) for leaf, is_row in zip(primal, tabled, strict=True) if is_row)
     blocks = -(-rows // block) if on_cpu() else 1
     size = -(-rows // blocks)
-    # Rows beyond the end repeat the last one, and do not count.
+    # Rows after the end repeat the last one and are not counted.
     fill = (0, blocks * size - rows)
     counts = jnp.arange(blocks * size).reshape(blocks, size) < rows
     table = [
@@ -77,7 +77,7 @@ def _with_gradient(law, primal: list, chosen: list[int], tabled: list[bool], blo
         some, counted = given
         some = iter(some)
         leaves = [next(some) if is_row else leaf for leaf, is_row in zip(primal, tabled, strict=True)]
-        # Scalars as wide as the block: their slopes are added up side by side, and summed once at the end.
+        # Scalars are broadcast to the block: their slopes are added elementwise, and summed once at the end.
         moving = [jnp.broadcast_to(leaves[i], (size,)) if jnp.ndim(leaves[i]) == 0 else leaves[i] for i in chosen]
 
         def of(moving):

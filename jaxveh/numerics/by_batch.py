@@ -1,4 +1,4 @@
-"""Two forms of one function: the one for a single call, the other for a batch of calls."""
+"""Two forms of one function: one for a single call, the other for a batch of calls."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
 LEAST, BLOCK = 64, 256
-"""Calls of a batch at a time, at least and at most: what so many carry stays in a processor's own cache."""
+"""The least and the largest number of calls of a batch at a time: the data of so many stay in a processor's own cache."""
 
 RUNS = "jaxveh_runs"
-"""Name of the batch's axis inside the form for many: `jax.lax.pmax(x, RUNS)` is the largest of a block's calls."""
+"""Name of the batch's axis inside the form for many: `jax.lax.pmax(x, RUNS)` is the largest value of a block's calls."""
 
 LANES = 8
-"""A block is so many times a whole number wide: what is left beside whole vectors is reckoned one by one."""
+"""The width of a block is a multiple of this: a remainder beside whole vectors would be computed one by one."""
 
 
 def by_batch(single: Callable, many: Callable, *operands: Any, least: int = 1, most: int = BLOCK) -> Any:
-    """`single(*operands)`; under `jax.vmap`, `many(*operands)` for each of the batch, in blocks of at most `most`.
+    """`single(*operands)`; under `jax.vmap`, `many(*operands)` for each call of the batch, in blocks of at most `most`.
 
-    A batch of fewer than `least` calls is `single`, too, unless further `jax.vmap`s around it make it large enough. Both are
-    pure functions of pytrees, close over nothing that is traced, and give the same but for rounding: only what is quickest
-    differs. Where a single call is differentiated, in a batch or not, it is `single`; a batch that is differentiated as a whole
-    (a sum of many log-likelihoods) is `many`.
+    A batch of fewer than `least` calls uses `single`, too, unless further `jax.vmap`s around it make it large enough.
+    Both must be pure functions of pytrees without traced values in their closures, and must give the same results
+    except for rounding: they differ only in speed. If a single call is differentiated, in a batch or not, `single` is
+    used; if a batch is differentiated as a whole (such as a sum of many log-likelihoods), `many` is used.
     """
     arrays, rest = eqx.partition(operands, eqx.is_array)
     leaves, structure = jax.tree.flatten(arrays)
@@ -52,7 +52,7 @@ def by_batch(single: Callable, many: Callable, *operands: Any, least: int = 1, m
 
 
 def _batched(leaves, axes, *, single, many, out, least, most):
-    """The form for many; where there are too few, both forms in a batch of their own, of which a larger one may come."""
+    """The form for many; if there are too few calls, both forms batched once more, because an outer batch may be larger."""
     size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
     leaves = [leaf if axis is None else jnp.moveaxis(leaf, axis, 0) for leaf, axis in zip(leaves, axes, strict=True)]
     along = [None if axis is None else 0 for axis in axes]
@@ -65,7 +65,7 @@ def _batched(leaves, axes, *, single, many, out, least, most):
 
 
 def _in_blocks(leaves, axes, size, many, most):
-    """`many` in blocks, one after the other; a last block that is not full repeats its last call."""
+    """The results of `many` in blocks, one after the other; a last block that is not full repeats its last call."""
     whole = jax.vmap(many, in_axes=axes, axis_name=RUNS)
     blocks, width = blocks_of(size, most)
     if blocks == 1:
@@ -87,7 +87,8 @@ def _in_blocks(leaves, axes, size, many, most):
 
 
 def blocks_of(size: int, most: int = BLOCK) -> tuple[int, int]:
-    """How many blocks of how many calls a batch is taken in: without a rest where that goes, for which results are copied."""
+    """The number of blocks of a batch and the number of calls in each; without a remainder if possible, as results are
+    copied for one."""
     fewest = -(-size // most)
     if fewest == 1:
         return 1, size
@@ -98,7 +99,7 @@ def blocks_of(size: int, most: int = BLOCK) -> tuple[int, int]:
 
 
 def _jvp(primals, tangents, *, single, many, out, least, most):
-    """Of what moves, by the form for a single call."""
+    """Values and slopes with respect to the operands that have tangents, by the form for a single call."""
     del many, out, least, most
     moves = [i for i, tangent in enumerate(tangents) if not isinstance(tangent, ad.Zero)]
 

@@ -5,10 +5,10 @@ the library's; elsewhere, and for other types and weakly typed values (Python nu
 used. Arrays of any shape; arguments of two-argument functions broadcast. NaN gives NaN. Errors stated are for
 float32 / float64.
 
-Every function is differentiable to any order by the way it is computed: what comes of bits (signs, exponents) is a constant
-factor of something that is not. Those made of polynomials have a derivative rule besides, which is faster and more accurate:
-jax before 0.12 drops such rules from the values that the backward pass of a scan keeps, so that second derivatives there
-are those of the polynomials.
+Every function can be differentiated to any order as it is computed: values from bits (signs, exponents) are constant
+factors of differentiable values. The functions made of polynomials also have a derivative rule, which is faster and
+more accurate. jax before 0.12 drops such rules from the values that the backward pass of a scan keeps, so that second
+derivatives there are those of the polynomials.
 """
 
 import math
@@ -28,7 +28,7 @@ _TANGENT_OF_PI_8 = math.sqrt(2) - 1
 _TANGENT_OF_3_PI_8 = math.sqrt(2) + 1
 
 _MANY = 64
-"""From this size on computing a number twice costs more than storing it."""
+"""From this size on, computing a number twice takes longer than storing it."""
 
 # Multiples of these parts are exact up to 2^13 (float32) and 2^26 (float64) half turns: Cody and Waite's reduction.
 _PI_PARTS_32 = (3.140625, 0.0009670257568359375, 6.278329573009626e-07)
@@ -39,9 +39,8 @@ _PI_PARTS_64 = (3.1415926218032837, 3.1786509424591713e-08, 1.2246467991473532e-
 def sin(x: ArrayLike) -> Array:
     """Sine of an angle in rad, any shape.
 
-    Absolute error below 2e-7 / 1e-15 for |x| <= 2e4 / 1e8 rad, relative to the result near 0. Beyond, the error grows
-    as if the angle had been rounded once more (|x| times the unit roundoff), and stays in [-1, 1]; infinity gives
-    NaN.
+    Absolute error below 2e-7 / 1e-15 for |x| <= 2e4 / 1e8 rad, relative to the result near 0. For larger |x| the error grows as
+    if the angle had been rounded once more (|x| times the unit roundoff), and the result stays in [-1, 1]; infinity gives NaN.
     """
     return _sin(_as_floats(x))
 
@@ -68,9 +67,9 @@ def arctan(x: ArrayLike) -> Array:
 def arctan2(y: ArrayLike, x: ArrayLike) -> Array:
     """Angle of the point (x, y) in rad, in [-pi, pi]. Absolute error below 3e-7 / 1e-15 in all quadrants.
 
-    At (0, 0) the value is 0 (with the sign of y) and both derivatives are 0, where the library's are NaN. The sign of
-    a zero y chooses between pi and -pi for negative x; the sign of a zero x is ignored. Derivatives hold where x^2 +
-    y^2 neither underflows nor overflows.
+    At (0, 0) the value is 0 (with the sign of y) and both derivatives are 0, whereas those of the library are NaN. The
+    sign of a zero y chooses between pi and -pi for negative x; the sign of a zero x is ignored. Derivatives hold where
+    x^2 + y^2 neither underflows nor overflows.
     """
     return _arctan2(*_same_type(y, x))
 
@@ -108,8 +107,8 @@ def log_of_normal(x: Array) -> Array:
     # x = 2^exponent * mantissa, with the mantissa between sqrt(2) and 2 sqrt(2).
     exponent = (word - origin) >> jnp.asarray(mantissa_bits, signed)
     lowered = exponent << jnp.asarray(mantissa_bits, signed)
-    # Bits have no derivative. The mantissa's is 2^-exponent, which is a number for all exponents but the largest, and there 0
-    # as 1 / x is.
+    # Bits have no derivative. That of the mantissa is 2^-exponent, which is a normal number for all exponents but the
+    # largest; there it is 0, as is 1 / x.
     slope = lax.bitcast_convert_type(one - lowered, x.dtype)
     mantissa = lax.bitcast_convert_type(word - lowered, x.dtype) + (x - held) * slope
     s = (mantissa - 2.0) / (mantissa + 2.0)
@@ -122,7 +121,7 @@ def log_of_normal(x: Array) -> Array:
 
 
 def _as_floats(x: ArrayLike) -> Array:
-    """As an array of floating point numbers; integers take the default type, as in `jax.numpy`."""
+    """`x` as an array of floating point numbers; integers get the default type, as in `jax.numpy`."""
     x = jnp.asarray(x)
     if jnp.issubdtype(x.dtype, jnp.inexact):
         return x
@@ -130,7 +129,7 @@ def _as_floats(x: ArrayLike) -> Array:
 
 
 def _same_type(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-    """Both in their common floating type; a value that has it already stays as it is, weakly typed or not."""
+    """Both values in their common floating type; a value of that type is unchanged, weakly typed or not."""
     common = jnp.result_type(x, y)
     if not jnp.issubdtype(common, jnp.inexact):
         common = jnp.result_type(float)
@@ -139,12 +138,12 @@ def _same_type(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
 
 
 def _ours(*arguments: Array) -> bool:
-    """Whether the polynomials apply; weakly typed values keep their weak type only through the library."""
+    """Whether the polynomials apply; weakly typed values keep their weak type only in the library's functions."""
     return on_cpu() and all(x.dtype in (jnp.float32, jnp.float64) and not x.weak_type for x in arguments)
 
 
 def _fence_many(values: Tree) -> Tree:
-    """Arguments as arrays in memory, where they are many: else XLA computes what they are made of once for each use."""
+    """Arguments as arrays in memory if they are large: otherwise XLA computes them once for each use."""
     return fence(values) if jax.tree.leaves(values)[0].size >= _MANY else values
 
 
@@ -155,7 +154,7 @@ def _reduced_sine(x: Array, half_turns: Array, sign: Array) -> Array:
     """sign * sin(x - pi * half_turns), for a difference within a quarter turn of 0."""
     first, second, third = _PI_PARTS_32 if x.dtype == jnp.float32 else _PI_PARTS_64
     r = ((x - half_turns * first) - half_turns * second) - half_turns * third
-    # Far outside the range the difference is rounding noise; the polynomial must not see it. NaN passes.
+    # Far outside the range the difference is rounding noise, which must not reach the polynomial. NaN passes.
     r = jnp.clip(r, -1.6, 1.6)
     t = r * r
     q = polynomials.evaluate(polynomials.of_dtype(x, polynomials.SINE_32, polynomials.SINE_64), t)
@@ -163,7 +162,7 @@ def _reduced_sine(x: Array, half_turns: Array, sign: Array) -> Array:
 
 
 def _alternating_sign(count: Array) -> Array:
-    """(-1)^count of whole numbers."""
+    """(-1)^count for whole numbers."""
     half = 0.5 * count
     return 1.0 - 4.0 * (half - jnp.floor(half))
 
@@ -286,8 +285,8 @@ def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Arra
 
 
 def _sqrt(x: Array) -> Array:
-    # At 0 what goes in and what comes out are constants, so that infinite slopes meet a zero on either way. XLA sees a choice
-    # between equals, which costs the value nothing.
+    # At 0 both the argument and the result are constants, so that an infinite slope is multiplied by zero in either
+    # mode. XLA sees a choice between equal values, which costs nothing.
     zero = x == 0.0
     root = jnp.sqrt(jnp.where(zero, lax.stop_gradient(x), x))
     return jnp.where(zero, lax.stop_gradient(root), root)

@@ -1,4 +1,4 @@
-"""Small arrays as their entries: NumPy arrays of objects, each a traced scalar or a number that is known."""
+"""Small arrays as entries: NumPy arrays of objects, each of which is a traced scalar or a known number."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import numpy as np
 from jax import Array
 
 Entries = np.ndarray
-"""Of dtype object and of the shape of the array whose entries it has; of shape () for a scalar."""
+"""A NumPy array of dtype object with the entries of an array, in its shape; shape () for a scalar."""
 
 
 def is_known(entry: Any) -> bool:
-    """Whether an entry is a number when the program is traced."""
+    """Whether an entry is already a number when the program is traced."""
     return isinstance(entry, np.generic)
 
 
 def entries(array: Any) -> Entries:
-    """The entries of an array: numbers of a NumPy array, else scalars."""
+    """The entries of an array: numbers if it is a NumPy array, otherwise traced scalars."""
     shape = np.shape(array)
     if isinstance(array, np.ndarray | np.generic):
         array = np.asarray(array)
@@ -32,7 +32,7 @@ def _scalar(array: Any) -> Any:
 
 
 def of_list(items: Sequence[Any], shape: tuple[int, ...]) -> Entries:
-    """Entries in row-major order."""
+    """Entries of this shape from items in row-major order."""
     found = np.empty(len(items), object)
     for i, item in enumerate(items):
         found[i] = item
@@ -45,7 +45,7 @@ def entry_list(several: Iterable[Entries]) -> list[Any]:
 
 
 def split(items: Sequence[Any], shapes: Sequence[tuple[int, ...]]) -> list[Entries]:
-    """The inverse of `entry_list`."""
+    """The inverse of `entry_list`: the items as entries of these shapes."""
     found, start = [], 0
     for shape in shapes:
         size = math.prod(shape)
@@ -55,7 +55,7 @@ def split(items: Sequence[Any], shapes: Sequence[tuple[int, ...]]) -> list[Entri
 
 
 def scalar_of(entry: Any, dtype: Any) -> Array:
-    """An entry as a scalar of JAX."""
+    """An entry as a JAX scalar."""
     return jnp.asarray(entry, dtype) if is_known(entry) else entry
 
 

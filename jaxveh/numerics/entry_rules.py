@@ -1,4 +1,4 @@
-"""What JAX's primitives do to arrays that are written out entry by entry (`written_out`)."""
+"""Rules of JAX's primitives for arrays that are written out entry by entry (`written_out`)."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ ELEMENTWISE = frozenset((
     "shift_right_arithmetic", "shift_right_logical", "sign", "sin", "sinh", "sqrt", "square", "stop_gradient", "sub", "tan",
     "tanh", "xor",
 ))  # fmt: skip
-"""Primitives of one result whose entries depend on the operands' at the same place alone."""
+"""Primitives with one result, each entry of which depends only on the operands' entries at the same place."""
 
 REDUCTIONS = {
     "reduce_sum": ("add", lax.add), "reduce_max": ("max", lax.max), "reduce_min": ("min", lax.min),
     "reduce_prod": ("mul", lax.mul), "reduce_and": ("and", lax.bitwise_and), "reduce_or": ("or", lax.bitwise_or),
 }  # fmt: skip
-"""By name, what two entries are combined by, and how."""
+"""By name, the primitive that combines two entries, and its function."""
 
 
 def elementwise(primitive: Any, params: dict[str, Any], operands: list[Entries], out: Any) -> Entries:
@@ -42,9 +42,9 @@ def elementwise(primitive: Any, params: dict[str, Any], operands: list[Entries],
 
 
 def one_entry(name: str, bind: Callable, operands: list[Any], dtype: Any) -> Any:
-    """One entry. What is known is reckoned here; sums with zero and products with one and zero are none.
+    """One entry of the result. Known numbers are computed here; sums with zero and products with one or zero are simplified.
 
-    So a matrix that is triangular costs what its lower half costs. A product of zero and NaN is zero here.
+    Thus a triangular matrix costs no more than its lower half. A product of zero and NaN is zero here.
     """
     simple = _simplified(name, operands, dtype)
     if simple is not None:
@@ -118,7 +118,7 @@ def inner_products(params: dict[str, Any], operands: list[Entries], out: Any) ->
 
 
 def _ordered(one: Entries, batch: tuple[int, ...], last: tuple[int, ...]) -> Entries:
-    """Axes of the batch, the others, and those that are summed over, each flattened to one."""
+    """The array with three axes: those of the batch, the others, and those that are summed over, each group flattened."""
     others = [axis for axis in range(one.ndim) if axis not in batch and axis not in last]
     size = lambda axes: math.prod(one.shape[axis] for axis in axes)
     return one.transpose(*batch, *others, *last).reshape(size(batch), size(others), size(last))
@@ -164,14 +164,14 @@ def _split(params, operands, out):
 
 
 def _unstack(params, operands, out):
-    # Parts of length one: an entry alone is no array.
+    # Parts of length one: a single entry is not an array.
     return [
         part.reshape(out.shape) for part in np.split(operands[0], operands[0].shape[params["axis"]], params["axis"])
     ]
 
 
 def _gather(params, operands, out):
-    """Where the indices are known, the places of the entries are, too."""
+    """A gather with known indices, whose entries are therefore known, too; None if the indices are not known."""
     places, indices = np.arange(operands[0].size).reshape(operands[0].shape), operands[1]
     if not all(is_known(index) for index in indices.reshape(-1)):
         return None
@@ -200,4 +200,4 @@ MOVES: dict[str, Callable] = {
     "transpose": lambda params, operands, out: operands[0].transpose(params["permutation"]),
     "unstack": _unstack,
 }
-"""Primitives that put entries elsewhere, and reckon nothing; `gather` gives None where its indices are not known."""
+"""Primitives that move entries without computing; `gather` gives None if its indices are not known."""

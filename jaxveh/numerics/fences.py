@@ -1,16 +1,16 @@
-"""Fences: where XLA on the CPU is made to compute once, and to store, what it would compute again for each that reads it.
+"""Fences make XLA on the CPU compute a value once and store it, instead of computing it again for each of its uses.
 
-One rule: what several read, and what costs more to compute than to store, is fenced where it leaves the function that makes it.
-There it is a decorator (`fence_results`) or the last thing that happens; formulas of tyres and vehicles stay as they are in the
-book, and the few that do not say by a figure why (`tests/core/test_where_fences_stand.py`).
+One rule: a value that is used several times and costs more to compute than to store is fenced at the end of the
+function that computes it, by a decorator (`fence_results`) or in its last statement. Formulas of tyres and vehicles
+stay as in the book; each exception has a measured number as its reason (`tests/core/test_where_fences_stand.py`).
 
-- `fence(tree)`: an optimization barrier. XLA keeps to it from jax 0.12 on; before, only speed is lost.
-- `fence(tree, firm=True)`: in every version of jax.
-- `@fence_results`, `fence_blocks(tree)`: firm, for arrays short enough for the processor's cache, and long enough to be
-  worth a branch.
-- `apart(function, ...)`: a whole function as a program of its own, whose *bits* do not depend on its surroundings.
+- `fence(tree)`: an optimization barrier. XLA respects it from jax 0.12 on; before that, only speed is lost.
+- `fence(tree, firm=True)`: a fence in every version of jax.
+- `@fence_results`, `fence_blocks(tree)`: firm, for arrays that are short enough for the processor's cache and long
+  enough to justify a branch.
+- `apart(function, ...)`: a whole function as a separate program, whose *bits* do not depend on its surroundings.
 
-All are the identity for values, batches and derivatives. On other platforms than the CPU the first three are nothing.
+All are the identity for values, batches and derivatives. On platforms other than the CPU the first three do nothing.
 """
 
 from __future__ import annotations
@@ -34,36 +34,37 @@ Tree = TypeVar("Tree")
 Method = TypeVar("Method", bound=Callable)
 
 MANY = 32
-"""From this size on computing numbers twice costs more than a branch around them: 60 vmapped cars gain, 12 hardly. Where XLA
-keeps to barriers they cost nothing, and every size counts."""
+"""From this size on, computing numbers twice costs more than a branch around them: 60 vmapped cars gain, 12 hardly.
+Where XLA respects barriers they cost nothing, and arrays of every size are fenced."""
 
 CACHED = 2**15
-"""Bytes of an array of which a few dozen fit into a processor's own cache."""
+"""The size (bytes) of an array of which a few dozen fit into a processor's own cache."""
 
 UNUSED_NAN = {"float32": (np.uint32, 0x7FDA_57ED), "float64": (np.uint64, 0x7FFA_57ED_57ED_57ED)}
-"""Words of numbers that no calculation gives."""
+"""The bits of NaNs that no calculation gives."""
 
 
 def fence(tree: Tree, *, firm: bool = False) -> Tree:
-    """`tree`, which XLA on the CPU computes once and stores; where it is not `firm`, from jax 0.12 on.
+    """`tree`, which XLA on the CPU computes once and stores; if not `firm`, only from jax 0.12 on.
 
-    `firm`: for rates of hundreds of operations, where computing them twice costs more than the branch that replaces the barrier
-    before jax 0.12: with it 1000 7-DOF cars take 175 instead of 400 ns a step there, and one takes 7.3 instead of 9.6 us.
+    `firm`: for rates with hundreds of operations, where computing them twice costs more than the branch that replaces
+    the barrier before jax 0.12: there, 1000 7-DOF cars take 175 instead of 400 ns per step with it, and one car takes
+    7.3 instead of 9.6 us.
     """
     return _of_traced(tree, _firmly(worth=False) if firm else lax.optimization_barrier)
 
 
 def fence_blocks(tree: Tree) -> Tree:
-    """`tree`, of which the arrays short enough for the cache are fenced firmly; before jax 0.12 those of at least 32 numbers.
+    """`tree`, with firm fences for arrays that are short enough for the cache, and before jax 0.12 have at least 32 numbers.
 
-    For values with several readers in an elementwise law of many terms: blocks of a batch are computed once, as are their
-    cotangents, and a whole batch, which would have to go to memory and back, is still fused.
+    For values that are used several times in an elementwise formula of many terms: blocks of a batch and their
+    cotangents are computed once, whereas a whole batch, which would have to go to memory and back, is still fused.
     """
     return _of_traced(tree, _firmly(worth=True))
 
 
 def fence_results(method: Method) -> Method:
-    """A function or method whose result goes through `fence_blocks`."""
+    """A decorator of a function or method: its result passes through `fence_blocks`."""
 
     @functools.wraps(method)
     def fenced_method(*arguments, **named):
@@ -73,7 +74,8 @@ def fence_results(method: Method) -> Method:
 
 
 def _of_traced(tree: Tree, through: Callable) -> Tree:
-    """On the CPU the tree's traced leaves `through`: a plain number stays one, so that checks on the host can look at it."""
+    """The tree, on the CPU with its traced leaves passed `through`. A plain number is unchanged, so that checks on the
+    host can read it."""
     leaves, structure = jax.tree.flatten(tree)
     traced = [i for i, leaf in enumerate(leaves) if not is_concrete(leaf)]
     if traced and on_cpu():
@@ -86,9 +88,9 @@ def _firmly(worth: bool) -> Callable:
     return lambda leaves: _firm.bind(*leaves, worth=worth, barrier=barriers_hold())
 
 
-# A primitive of its own, for two reasons. What is worth it depends on the size, which under `vmap` is known only when the batch
-# is; and the branch of an ordinary `lax.cond` would become a selection there, which fences nothing. A step of 240 vmapped 7-DOF
-# cars on MF-Tyre takes 2.8 instead of 17 us a car on jax 0.10, and 1.9 instead of 2.4 on jax 0.12.
+# This is a primitive for two reasons. Whether a fence pays depends on the size, which under `vmap` is known only with
+# the batch; and an ordinary `lax.cond` would become a selection there, which does not fence. A step of 240 vmapped
+# 7-DOF cars on MF-Tyre takes 2.8 instead of 17 us per car on jax 0.10, and 1.9 instead of 2.4 on jax 0.12.
 
 
 def _lowered(*leaves, worth, barrier):
@@ -109,11 +111,11 @@ def _worth_storing(leaf, least: int) -> bool:
 
 
 def _through_branch(leaves: list) -> list:
-    """Through a branch that is always taken but cannot be known to be: XLA fuses nothing across it.
+    """The arrays passed through a branch that is always taken, which XLA cannot know: it fuses nothing across the branch.
 
-    On jax 0.10 the gradient of MF-Tyre in blocks takes 610 instead of 1130 ns a contact, and 9 instead of 15 s to compile; an
-    array that passes through costs 0.4 ns a number. Arrays of several dtypes, or of other ones than float32 and float64, are
-    as they are.
+    On jax 0.10 the gradient of MF-Tyre in blocks takes 610 instead of 1130 ns per contact, and 9 instead of 15 s to
+    compile; an array that passes through costs 0.4 ns per number. Arrays of several dtypes, or of other dtypes than
+    float32 and float64, are returned unchanged.
     """
     kinds = {str(leaf.dtype) for leaf in leaves}
     if len(kinds) > 1 or not kinds <= set(UNUSED_NAN):
@@ -123,7 +125,7 @@ def _through_branch(leaves: list) -> list:
 
 
 def _always(number):
-    """True for every number that a calculation gives, NaN included, which XLA cannot know."""
+    """True for every number that a calculation gives, including NaN; XLA cannot know that it is true."""
     if not jnp.issubdtype(number.dtype, jnp.floating):
         return number != jnp.asarray(jnp.iinfo(number.dtype).min, number.dtype)
     kind, unused = UNUSED_NAN[str(number.dtype)]
@@ -131,7 +133,7 @@ def _always(number):
 
 
 def _of_those_there(values, **how):
-    """Fenced, of tangents or cotangents, those that are no symbolic zeros."""
+    """Tangents or cotangents, with fences for those that are not symbolic zeros."""
     values = list(values)
     there = [i for i, value in enumerate(values) if not isinstance(value, ad.Zero)]
     if there:
@@ -155,18 +157,17 @@ ad.primitive_transposes[_firm] = lambda cotangents, *primals, **how: _of_those_t
 
 @eqx.filter_jit
 def apart(function, number, *operands):
-    """`function(*operands)` as a program of its own, so that a step's bits do not depend on what surrounds it.
+    """`function(*operands)` as a separate program, so that a step's bits do not depend on its surroundings.
 
-    XLA fuses a step with its surroundings, differently in a scan, in a live loop and beside other outputs, and rounds
-    differently with it. It never fuses across a conditional; `number`, any that the step is given (its time, its
-    count), makes one that always holds. Called outside jit, this is compiled once as well.
-    Transformations pass through; under differentiation there is no conditional, which would cost a copy of all that the
-    backward pass needs.
+    XLA fuses a step with its surroundings, differently in a scan, in a live loop and beside other outputs, which
+    changes the rounding. It never fuses across a conditional; `number`, any number given to the step (its time, its
+    count), makes a conditional that is always true. A call outside jit is also compiled once. Transformations pass
+    through; under differentiation there is no conditional, as it would cost a copy of all values that the backward pass needs.
     """
     arrays, rest = eqx.partition((function, operands), eqx.is_array)
     leaves, structure = jax.tree.flatten(arrays)
 
-    # Traced once, and written out wherever it is called: below it is four times.
+    # Traced once, and inlined wherever it is called, four times below.
     @functools.partial(jax.jit, inline=True)
     def together(*leaves):
         function, operands = eqx.combine(jax.tree.unflatten(structure, leaves), rest)
@@ -180,7 +181,7 @@ def apart(function, number, *operands):
     @alone.defjvp
     def _(primals, tangents):
         condition, *leaves = primals
-        # In a batch the condition makes every result a batch. The selection does so here, where jax counts on the same.
+        # In a batch the condition makes every result batched. The selection has the same effect here, as jax expects.
         selected = lambda *leaves: jax.tree.map(lambda x: jnp.where(condition, x, _zeros(x)), together(*leaves))
         return jax.jvp(selected, tuple(leaves), tuple(tangents[1:]))
 
@@ -189,6 +190,6 @@ def apart(function, number, *operands):
 
 def _zeros(like):
     if jnp.issubdtype(like.dtype, jax.dtypes.prng_key):
-        # The only generator that `numerics` draws from.
+        # The only generator from which `numerics` draws.
         return jax.random.wrap_key_data(jnp.zeros((*like.shape, 2), jnp.uint32), impl="threefry2x32")
     return jnp.zeros(like.shape, like.dtype)

@@ -5,12 +5,12 @@ from jax import Array, lax
 
 
 def float_layout(x: Array) -> tuple[type, int]:
-    """The unsigned type of a number's bits, and how many of them are the mantissa's."""
+    """The unsigned type of a number's bits, and the number of bits of the mantissa."""
     return (jnp.uint32, 23) if x.dtype == jnp.float32 else (jnp.uint64, 52)
 
 
 def bits_of(word: Array, value: int) -> Array:
-    """A whole number as a word of the same type."""
+    """The whole number `value` as a word of the type of `word`."""
     return jnp.asarray(value, word.dtype)
 
 
@@ -22,7 +22,7 @@ def flip_sign(x: Array, word: Array) -> Array:
 
 
 def sign_of(x: Array) -> Array:
-    """1 with the sign bit of `x`; as bits, because a comparison loses the sign of zero. A constant to derivatives."""
+    """1 with the sign bit of `x`; by bits, because a comparison loses the sign of zero. Its derivative is zero."""
     unsigned, _ = float_layout(x)
     mask = jnp.asarray(1 << (8 * x.dtype.itemsize - 1), unsigned)
     one = lax.bitcast_convert_type(jnp.ones_like(x), unsigned)

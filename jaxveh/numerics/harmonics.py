@@ -1,8 +1,8 @@
-"""Random signals of unit variance as sums of harmonics: smooth, of a stated spectrum, the same for the same key.
+"""Random signals of unit variance as sums of harmonics: smooth, with a given spectrum, the same for the same key.
 
-Every harmonic carries the same energy and stands at a random place in its own share of the spectrum, with a random
-phase (M. Shinozuka and C.-M. Jan, J. Sound and Vibration 25 (1972), with shares of equal energy). Over keys, mean,
-variance and autocorrelation are those of the spectrum; over a long stretch of one signal they tend to them, too.
+Every harmonic has the same energy, a random frequency in its own part of the spectrum, and a random phase (M. Shinozuka
+and C.-M. Jan, J. Sound and Vibration 25 (1972), with parts of equal energy). Averaged over keys, mean, variance and
+autocorrelation are those of the spectrum; over a long stretch of one signal they tend to these values.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from jaxveh.numerics.random import uniform
 def band_harmonics(
     key: Array, lowest: float, highest: float, count: int, dtype: DTypeLike | None = None
 ) -> tuple[Array, Array]:
-    """Frequencies and phases (rad), (count,) each, of a signal that is white between two frequencies, else nothing."""
+    """Frequencies and phases (rad), (count,) each, of a signal that is white between two frequencies and has no energy
+    elsewhere."""
     share, phases = _shares(key, count, dtype)
     return lowest + (highest - lowest) * share, phases
 
@@ -42,7 +43,7 @@ def gauss_markov_harmonics(
 
 
 def sum_of_harmonics(x: Array, frequencies: Array, phases: Array) -> Array:
-    """`sqrt(2 / n) sum cos(2 pi f x + phase)` over n harmonics: variance 1, the shape of x.
+    """`sqrt(2 / n) sum cos(2 pi f x + phase)` over n harmonics: variance 1, in the shape of x.
 
     `frequencies` and `phases` are (n,).
     """

@@ -1,4 +1,4 @@
-"""What JAX's primitives do to arrays of a batch whose axis is the last one (`batch_last`): (..., size) for (...)."""
+"""Rules of JAX's primitives for arrays whose last axis is the batch (`batch_last`): (..., size) instead of (...)."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from jax import Array, lax
 from jaxveh.numerics.fences import fence
 
 MOST_TERMS = 64
-"""Terms up to which a sum is written out, one after the other, so that XLA's loops run along the batch."""
+"""The largest number of terms of a sum that is written out, one after the other, so that XLA's loops run along the batch."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Last:
-    """A value of each of a batch: `array` (..., size)."""
+    """A value for each member of a batch: `array` (..., size)."""
 
     array: Array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Product:
-    """A product (..., size) that only a sum reads: its terms are multiplied there, and it is never stored."""
+    """A product (..., size) that is used only by a sum, which multiplies its terms; it is never stored."""
 
     factors: tuple[Array, Array]
 
 
 def wide(value: Any, shape: tuple[int, ...], size: int) -> Array:
-    """A value, of the batch or the same for all of it, as (*shape, size); a scalar stands for all places."""
+    """A value, per member of the batch or the same for all, as (*shape, size); a scalar is broadcast to all places."""
     array = value.array if isinstance(value, Last) else jnp.asarray(value)[..., None]
     return jnp.broadcast_to(array, (*shape, size))
 
 
 def pieces(array: Array, axes: Sequence[int]) -> list[Array]:
-    """The array at each place of these axes, of which the last moves fastest, without them."""
+    """The parts of the array at each place along `axes`, without these axes; the last axis varies fastest."""
     found = []
     for place in np.ndindex(*(array.shape[axis] for axis in axes)):
         start, end = [0] * array.ndim, list(array.shape)
@@ -52,7 +52,7 @@ def pieces(array: Array, axes: Sequence[int]) -> list[Array]:
 
 
 def reduction(combine: Callable, axes: tuple[int, ...], operand: Array | Product) -> Array | None:
-    """A reduction, from the first term to the last; None where it is of none or of too many."""
+    """A reduction, from the first term to the last; None if there are no terms or too many."""
     first = operand.factors[0] if isinstance(operand, Product) else operand
     if not 0 < math.prod(first.shape[axis] for axis in axes) <= MOST_TERMS:
         return None
@@ -63,7 +63,7 @@ def reduction(combine: Callable, axes: tuple[int, ...], operand: Array | Product
 
 
 def inner_products(params: dict[str, Any], a: Array, b: Array) -> Array | None:
-    """A `dot_general` without axes of a batch of its own, term by term; None where there are such, or too many terms."""
+    """A `dot_general` term by term; None if it has batch axes of its own or too many terms."""
     (axes_a, axes_b), (batch, _) = params["dimension_numbers"]
     if batch or not 0 < math.prod(a.shape[axis] for axis in axes_a) <= MOST_TERMS:
         return None
@@ -74,9 +74,10 @@ def inner_products(params: dict[str, Any], a: Array, b: Array) -> Array | None:
 
 
 def cholesky(matrix: Array) -> Array:
-    """The lower factors (n, n, size) of matrices of which the lower triangle is read; NaN from a pivot on that is not positive.
+    """The lower factors (n, n, size) of matrices, of which the lower triangle is read; NaN from the first pivot that is
+    not positive.
 
-    A loop: written out, the factors of 11 states take 30 instead of 110 ns, but half a second to compile each time.
+    It is a loop: written out, the factors for 11 states take 30 instead of 110 ns, but half a second to compile each time.
     """
     rows = jnp.arange(len(matrix))[:, None]
 
@@ -92,7 +93,7 @@ def cholesky(matrix: Array) -> Array:
 
 
 def triangular_solve(params: dict[str, Any], factor: Array, b: Array) -> Array:
-    """The solutions (n, k, size) or, from the right, (k, n, size), row by row."""
+    """The solutions (n, k, size), or (k, n, size) for a factor on the right, row by row."""
     lower, transposed = params["lower"], params["transpose_a"]
     if not params["left_side"]:
         b, transposed = jnp.swapaxes(b, 0, 1), not transposed
@@ -109,7 +110,7 @@ def triangular_solve(params: dict[str, Any], factor: Array, b: Array) -> Array:
 
 
 def gather(params: dict[str, Any], operand: Array, indices: Any, shape: tuple[int, ...]) -> Array:
-    """A gather at the same `indices` for all of the batch, to (*shape, size)."""
+    """A gather with the same `indices` for the whole batch; the result has the shape (*shape, size)."""
     numbers = params["dimension_numbers"]
     numbers = numbers._replace(offset_dims=(*numbers.offset_dims, len(shape)))
     sizes = (*params["slice_sizes"], operand.shape[-1])
@@ -155,11 +156,11 @@ MOVES: dict[str, Callable] = {
     ),
     "unstack": lambda params, operands, out: pieces(operands[0], (params["axis"],)),
 }
-"""Primitives that put numbers elsewhere, and reckon nothing."""
+"""Primitives that move numbers without computing."""
 
 
 def _of_matrices(function: Callable, operands: Sequence[Array]) -> Array:
-    """The function of matrices (n, k, size), for each of those that lie along further axes before them."""
+    """A function of matrices (n, k, size), applied along further leading axes."""
     for _ in range(operands[0].ndim - 3):
         function = jax.vmap(function)
     return function(*operands)
@@ -172,4 +173,4 @@ ALGEBRA: dict[str, Callable] = {
         functools.partial(triangular_solve, params), operands
     ),
 }
-"""Primitives of matrices; what is None is left to `jax.vmap`."""
+"""Primitives of matrices; where a rule gives None, `jax.vmap` is used."""

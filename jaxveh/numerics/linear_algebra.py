@@ -1,8 +1,7 @@
 """Square-root algebra of small covariance matrices (..., n, n).
 
-Up to `WRITTEN_OUT` rows the formulas are written out in scalars, several times faster on the CPU than a call of
-LAPACK for each matrix; above, the library's routines do the work. A factor is always lower triangular, and leading
-axes are a batch.
+Up to `WRITTEN_OUT` rows the formulas are written out in scalars, several times faster on the CPU than a call of LAPACK for each
+matrix; larger matrices use the library's routines. A factor is always lower triangular, and leading axes are a batch.
 """
 
 from collections.abc import Callable
@@ -24,7 +23,7 @@ Rows = list[list[Array]]
 def cholesky(matrix: Array) -> Array:
     """Lower factor L (..., n, n) of L L^T = matrix (..., n, n), of which only the lower triangle is read.
 
-    A matrix that is not positive definite has NaN in the last diagonal element of its factor, at least.
+    If the matrix is not positive definite, at least the last diagonal element of its factor is NaN.
     """
     n = _square(matrix, "matrix")
     if n > WRITTEN_OUT:
@@ -34,25 +33,25 @@ def cholesky(matrix: Array) -> Array:
 
 @jax.jit
 def solve_lower(factor: Array, b: Array) -> Array:
-    """x of L x = b, for a factor L (..., n, n) and b (..., n), or (..., n, k) with as many axes as L."""
+    """The solution x of L x = b, for a factor L (..., n, n) and b (..., n), or (..., n, k) with as many axes as L."""
     return _by_columns(_forward, factor, b)
 
 
 @jax.jit
 def solve_lower_transposed(factor: Array, b: Array) -> Array:
-    """x of L^T x = b; shapes as for `solve_lower`."""
+    """The solution x of L^T x = b; shapes as for `solve_lower`."""
     return _by_columns(_backward, factor, b)
 
 
 @jax.jit
 def solve_psd(factor: Array, b: Array) -> Array:
-    """x of L L^T x = b: the solution for the matrix that was factored; shapes as for `solve_lower`."""
+    """The solution x of L L^T x = b, for the matrix that was factored; shapes as for `solve_lower`."""
     return solve_lower_transposed(factor, solve_lower(factor, b))
 
 
 @jax.jit
 def inverse_psd(factor: Array) -> Array:
-    """(L L^T)^-1 (..., n, n), symmetric, from the factor L (..., n, n)."""
+    """The inverse (L L^T)^-1 (..., n, n), symmetric, from the factor L (..., n, n)."""
     n = _square(factor, "factor")
     if n > WRITTEN_OUT:
         identity = jnp.broadcast_to(jnp.eye(n, dtype=factor.dtype), factor.shape)
@@ -72,7 +71,7 @@ def log_det(factor: Array) -> Array:
 
 @jax.jit
 def mahalanobis(factor: Array, residual: Array) -> Array:
-    """r^T (L L^T)^-1 r (...,): the squared distance of a residual r (..., n) from 0."""
+    """r^T (L L^T)^-1 r (...,): the squared Mahalanobis distance of a residual r (..., n)."""
     n = _square(factor, "factor")
     if residual.shape[-1:] != (n,):
         raise ValueError(f"residual has shape {residual.shape}; for a factor {factor.shape} it must be (..., {n}).")
@@ -97,7 +96,7 @@ def _square(matrix: Array, name: str) -> int:
 
 
 def _dot(a: list[Array], b: list[Array]) -> Array:
-    """Inner product of two lists of scalars (...,), not empty."""
+    """Inner product of two non-empty lists of scalars (...,)."""
     total = a[0] * b[0]
     for x, y in zip(a[1:], b[1:], strict=True):
         total = total + x * y
@@ -131,9 +130,9 @@ def _inverse_rows(factor: Array) -> Rows:
 
 
 def _from_rows(rows: Rows) -> Array:
-    """The lower triangular matrix (..., n, n) of its rows of scalars (...,)."""
+    """The lower triangular matrix (..., n, n) with these rows of scalars (...,)."""
     zero = jnp.zeros_like(rows[0][0])
-    rows = fence(rows)  # or each entry of the stack would be computed from the beginning again
+    rows = fence(rows)  # otherwise each entry of the stack would be computed from the beginning
     return jnp.stack([jnp.stack([*row, *[zero] * (len(rows) - len(row))], -1) for row in rows], -2)
 
 
@@ -150,7 +149,7 @@ def _by_columns(solve: Callable[[Array, list[Array]], list[Array]], factor: Arra
         columns = b[..., None] if vector else b
         solution = _library_solve(factor, columns, transposed=solve is _backward)
         return solution[..., 0] if vector else solution
-    # A matrix is solved for all columns at once: a row of it stands where a vector has a scalar.
+    # For a matrix, all columns are solved at once: a row of the matrix takes the place of a vector's scalar.
     entries = factor if vector else factor[..., None, :, :]
     rows = [b[..., i] if vector else b[..., i, :] for i in range(n)]
     return jnp.stack(fence(solve(entries, rows)), -1 if vector else -2)

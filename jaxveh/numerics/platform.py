@@ -1,14 +1,14 @@
 """The one place that decides, at trace time, between forms for the CPU and forms for an accelerator.
 
-On the CPU XLA recomputes an expression in each consumer that it fuses it into, and its trigonometric functions are
-slow; on an accelerator both are handled well. Everything in this package that differs by platform asks here.
+On the CPU, XLA computes an expression again in each operation into which it fuses it, and its trigonometric functions
+are slow; on an accelerator neither is a problem. Every choice by platform in this package is made by these functions.
 """
 
 import jax
 
 
 def on_cpu() -> bool:
-    """Whether code traced now is meant for the CPU: the platform of `jax_default_device`, else the default backend."""
+    """Whether code traced now is meant for the CPU: the platform of `jax_default_device`, otherwise the default backend."""
     device = jax.config.jax_default_device  # pyright: ignore[reportAttributeAccessIssue]
     if device is None:
         return jax.default_backend() == "cpu"
@@ -16,13 +16,13 @@ def on_cpu() -> bool:
 
 
 def barriers_hold() -> bool:
-    """Whether XLA keeps to a `fence` that is not firm: on the CPU before jax 0.12 it dissolves them, and fuses across.
+    """Whether XLA respects a `fence` that is not firm: on the CPU before jax 0.12 it removes such fences and fuses across them.
 
-    Only speed depends on this: forms that rely on a fence (a concatenation of long expressions) have another without.
+    Only speed depends on this: forms that rely on a fence (a concatenation of long expressions) have an alternative without it.
     """
     return not on_cpu() or jax.__version_info__ >= (0, 12)
 
 
 def pays_alone() -> bool:
-    """Whether a single run, that is no batch, gains by being written out: before jax 0.12 it would take twice as long."""
+    """Whether a single run, not a batch, is faster when written out: before jax 0.12 it would take twice as long."""
     return barriers_hold()

@@ -1,8 +1,7 @@
 """Polynomials of the elementary functions, and their evaluation.
 
 An odd function of the reduced argument r is written f(r) = r + r t q(t), with t = r^2: small arguments then keep
-their relative accuracy. Coefficients are those of q, ascending; `tests/numerics/coefficients.py` is the recipe that
-made them.
+their relative accuracy. Coefficients are those of q, ascending; `tests/numerics/coefficients.py` computes them.
 """
 
 import jax.numpy as jnp

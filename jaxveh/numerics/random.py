@@ -29,20 +29,22 @@ _KEY_PARITY = 0x1BD11BDA
 def normal(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
     """Standard normal numbers of `shape` by Box and Muller (1958), float32 or float64 (the default type if None).
 
-    Never infinite; two words of 32 bits make two numbers, whatever the type, so that |z| reaches 6.7: beyond it lies
-    1.4e-11 of the distribution.
+    Never infinite; two words of 32 bits make two numbers, whatever the type, so that |z| is at most 6.7: the
+    probability of larger values is 1.4e-11.
     """
     return _normal(key, _shape(shape), _dtype(dtype))
 
 
 def normals(key: Array, count: int, shape: Shape = (), dtype: DTypeLike | None = None) -> tuple[Array, ...]:
-    """`count` independent arrays of `shape` of standard normal numbers: one for each field of a state.
+    """`count` independent arrays of `shape` with standard normal numbers, such as one for each field of a state.
 
-    Cheaper than rows of one array from `normal`, because nothing is joined; the numbers differ from that one's.
+    Cheaper than rows of one array from `normal`, because nothing is concatenated; the numbers differ from those of `normal`.
     """
     shape, count = _shape(shape), operator.index(count)
     if count < 0 or count * math.prod(shape) >= 2**31:
-        raise ValueError(f"{count} arrays of shape {shape} asked of one key; at most 2^31 - 1 numbers: split the key.")
+        raise ValueError(
+            f"{count} arrays of shape {shape} from one key; at most 2^31 - 1 numbers are possible: split the key."
+        )
     return _normals(key, count, shape, _dtype(dtype))
 
 
@@ -57,7 +59,7 @@ def exponential(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -
 
 
 def cauchy(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
-    """Standard Cauchy numbers of `shape`, tangents of random angles; |z| reaches 7e8 (float32) or 3e18 (float64)."""
+    """Standard Cauchy numbers of `shape`, tangents of random angles; |z| is at most 7e8 (float32) or 3e18 (float64)."""
     return _cauchy(key, _shape(shape), _dtype(dtype))
 
 
@@ -65,14 +67,14 @@ def student_t(key: Array, df: ArrayLike, shape: Shape = (), dtype: DTypeLike | N
     """Student's t numbers of `shape` by Bailey's polar method, with `df` > 0 degrees of freedom.
 
     `df` broadcasts against `shape` and is differentiable. sqrt(df (u^(-2 / df) - 1)) cos(theta) is exact for every df
-    (Bailey, Mathematics of Computation 62, 1994). |t| reaches sqrt(df (2^(66 / df) - 1)) in float32, with 130 for 66
-    in float64, and at most the root of the largest number.
+    (Bailey, Mathematics of Computation 62, 1994). |t| is at most sqrt(df (2^(66 / df) - 1)) in float32, with 130
+    instead of 66 in float64, and at most the square root of the largest number.
     """
     dtype = _dtype(dtype)
     return _student_t(key, jnp.asarray(df, dtype), _shape(shape), dtype)
 
 
-# The computations, compiled each as one: outside of jit they would be dozens of small programs.
+# The computations, each compiled as one program: without jit they would be dozens of small programs.
 
 
 @partial(jax.jit, static_argnums=(1, 2))
@@ -84,7 +86,7 @@ def _normal(key: Array, shape: tuple[int, ...], dtype: jnp.dtype) -> Array:
     if barriers_hold():
         sines, cosines = _normal_pairs(key, half, dtype)
         return fence(jnp.concatenate((sines, cosines))[:count]).reshape(shape)
-    # The same numbers without a concatenation, into which XLA would draw everything, scalar by scalar.
+    # The same numbers without a concatenation, into which XLA would fuse everything, scalar by scalar.
     place, first_half = _places(count)
     sines, cosines = _box_muller(*_blocks(key, place), dtype)
     return jnp.where(first_half, sines, cosines).reshape(shape)
@@ -133,7 +135,7 @@ def _student_t(key: Array, df: Array, shape: tuple[int, ...], dtype: jnp.dtype) 
 def _shape(shape: Shape) -> tuple[int, ...]:
     sizes = tuple(map(operator.index, shape)) if isinstance(shape, Sequence) else (operator.index(shape),)
     if math.prod(sizes) >= 2**31:
-        raise ValueError(f"shape {sizes} asked of one key; at most 2^31 - 1 numbers: split the key.")
+        raise ValueError(f"shape {sizes} from one key; at most 2^31 - 1 numbers are possible: split the key.")
     return sizes
 
 
@@ -153,7 +155,7 @@ def _positive_unit(word: Array, dtype: jnp.dtype) -> Array:
 
 
 def _box_muller(first: Array, second: Array, dtype: jnp.dtype) -> tuple[Array, Array]:
-    """Two independent standard normal numbers of two random words, elementwise."""
+    """Two independent standard normal numbers from two random words, elementwise."""
     radius = jnp.sqrt(-2.0 * log_of_normal(_positive_unit(first, dtype)))
     sine, cosine = half_turn_of_word(second, dtype)
     return radius * sine, radius * cosine
@@ -174,7 +176,7 @@ def _words(key: Array, count: int, dtype: jnp.dtype) -> Array:
 
 
 def _places(count: int) -> tuple[Array, Array]:
-    """For each of `count` numbers, half of them from the first words of blocks: its block, and whether the first word."""
+    """For each of `count` numbers, its block and whether it is the first word of the block; the first half are first words."""
     half = _uint32((count + 1) // 2)
     index = jax.lax.iota(jnp.uint32, count)
     first_half = index < half
@@ -182,7 +184,7 @@ def _places(count: int) -> tuple[Array, Array]:
 
 
 def _word_pairs(key: Array, place: Array, count: int, dtype: jnp.dtype) -> tuple[Array, Array]:
-    """Two words as wide as `dtype` for each place, all below `count`."""
+    """Two words as wide as `dtype` for each place; all places are below `count`."""
     if dtype == jnp.float32:
         return _blocks(key, place)
     return _double_words(key, place), _double_words(key, place + _uint32(count))
@@ -197,7 +199,7 @@ def _blocks(key: Array, place: Array) -> tuple[Array, Array]:
     """Both words of the blocks numbered `place` of threefry-2x32 with 20 rounds (Salmon et al., SC 2011)."""
     if str(jax.random.key_impl(key)) != "threefry2x32":
         raise ValueError(
-            f"key is of the generator {jax.random.key_impl(key)}; numbers are drawn from threefry2x32: "
+            f"key is of the generator {jax.random.key_impl(key)}; it must be of threefry2x32: "
             "make it by jax.random.key(seed, impl='threefry2x32')."
         )
     data = jax.random.key_data(key)

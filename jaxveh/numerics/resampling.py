@@ -1,12 +1,11 @@
-"""Resampling: which particle each of the next generation descends from.
+"""Resampling: the choice of an ancestor for each particle of the next generation.
 
 Every scheme takes weights (N,), not negative and finite with a positive sum, normalised or not, and returns ancestors
-(n,), int32 and nondecreasing, with n = N unless asked otherwise. The expected number of children of particle i is n
-w_i / sum(w).
+(n,), int32 and nondecreasing, by default with n = N. The expected number of children of particle i is n w_i / sum(w).
 
-Cumulated weights are whole numbers, of 2^30 (float32) or 2^52 (float64) parts of the sum. Their sums are exact in any
-order, so that rounding never loses a particle, goes past the last, breaks the order, or chooses one of zero weight; a
-weight below half a part counts as zero. Ancestors are integers: no gradient passes through them.
+Cumulated weights are whole numbers: the sum has 2^30 (float32) or 2^52 (float64) parts. Sums of whole numbers are exact
+in any order, so that rounding cannot lose a particle, go past the last one, break the order, or choose a particle of
+zero weight; a weight below half a part counts as zero. Ancestors are integers: no gradient passes through them.
 """
 
 import math
@@ -42,14 +41,14 @@ def stratified(key: Array, weights: Array, n: int | None = None) -> Array:
     position = _position(parts, total, n, weights.dtype)
     whole = jnp.minimum(jnp.floor(position), n - 1)
     stratum = fence(whole.astype(jnp.int32))
-    # All strata below the position's are passed, its own if the offset is.
+    # All strata below that of the position are passed, and its own stratum if its offset is below the position.
     passed = stratum + (offsets[stratum] < position - whole).astype(jnp.int32)
     return _ancestors(jnp.where(parts == total, n, passed), n)
 
 
 @partial(jax.jit, static_argnums=2, static_argnames="n")
 def multinomial(key: Array, weights: Array, n: int | None = None) -> Array:
-    """n independent draws, in order: sorted uniforms by exponential spacings, and a binary search."""
+    """n independent draws in ascending order, by sorted uniform numbers from exponential spacings and a binary search."""
     n = _size(weights, n)
     parts, total = _cumulated_parts(weights)
     return _search(parts, _sorted_parts(key, n, jnp.asarray(n, jnp.int32), total, weights.dtype))
@@ -57,10 +56,10 @@ def multinomial(key: Array, weights: Array, n: int | None = None) -> Array:
 
 @partial(jax.jit, static_argnums=2, static_argnames="n")
 def residual(key: Array, weights: Array, n: int | None = None) -> Array:
-    """floor(n w_i) children each, the rest by multinomial draws from the remainders (Liu and Chen, 1998)."""
+    """floor(n w_i) children of each particle, the others by multinomial draws from the remainders (Liu and Chen, 1998)."""
     n = _size(weights, n)
     expected = weights * (n / jnp.sum(weights))
-    # An expected number that rounding put just below a whole one counts as whole.
+    # An expected number just below a whole number by rounding counts as that whole number.
     certain = jnp.floor(expected * (1.0 + 8.0 * float(jnp.finfo(weights.dtype).eps)))
     remainder = jnp.maximum(expected - certain, 0.0)
     certain = certain.astype(jnp.int32)
@@ -82,9 +81,9 @@ def ess(weights: Array) -> Array:
 
 @jax.jit
 def normalise(log_weights: Array) -> tuple[Array, Array, Array]:
-    """Of log weights (N,): weights that sum to 1, the logarithm of the mean weight, whether any particle is alive.
+    """From log weights (N,): weights that sum to 1, the logarithm of the mean weight, and whether any particle is alive.
 
-    An entry that is not finite is dead and gets weight 0. If all are, the weights are uniform, the logarithm is
+    An entry that is not finite is dead and gets weight 0. If all entries are dead, the weights are uniform, the logarithm is
     -infinity and `alive` is False. Gradients are finite in every case, and zero with respect to dead entries.
     """
     count = log_weights.shape[-1]
@@ -114,19 +113,19 @@ def _size(weights: Array, n: int | None) -> int:
 
 
 def _cumulated_parts(weights: Array) -> tuple[Array, Array]:
-    """Cumulated weights in whole parts (N,), and their sum: 2^30 or 2^52 but for rounding."""
+    """Cumulated weights in whole parts (N,), and their sum: 2^30 or 2^52, except for rounding."""
     parts = _as_parts(weights)
     cumulated = fence(_cumulative_sum(parts))
     return cumulated, cumulated[-1]
 
 
 def _cumulative_sum(values: Array) -> Array:
-    """Cumulative sum of whole numbers (N,); the library's takes the CPU up to three times as long."""
+    """Cumulative sum of whole numbers (N,); on the CPU the library's function takes up to three times as long."""
     return _cumulated_by_blocks(values) if on_cpu() else jax.lax.cumsum(values)
 
 
 def _cumulated_by_blocks(values: Array) -> Array:
-    """Sums within blocks of 8, all blocks at once, and before them the cumulated sums of the blocks."""
+    """Cumulative sums within blocks of 8, for all blocks at once, plus the cumulated sums of the blocks before."""
     size, block = values.shape[0], 8
     count = -(-size // block)
     blocks = jax.lax.pad(values, jnp.zeros((), values.dtype), [(0, count * block - size, 0)]).reshape(count, block)
@@ -151,14 +150,14 @@ def _position(parts: Array, total: Array, n: int, dtype: jnp.dtype) -> Array:
 
 
 def _ancestors(passed: Array, n: int) -> Array:
-    """Ancestors (n,), where `passed` (N,) counts the children of all particles up to and with each: its last is n."""
+    """Ancestors (n,), where `passed` (N,) is the number of children of all particles up to and including each; the last is n."""
     passed = fence(jnp.clip(passed, 0, n))
     ended = jnp.zeros(n, jnp.int32).at[passed].add(1, mode="drop", indices_are_sorted=True)
     return fence(_cumulative_sum(fence(ended)))
 
 
 def _sorted_parts(key: Array, n: int, count: Array, total: Array, dtype: jnp.dtype) -> Array:
-    """(n,) whole numbers in [0, total): `count` sorted uniform ones, then numbers that mean nothing."""
+    """(n,) whole numbers in [0, total): `count` sorted uniform numbers, then numbers without meaning."""
     spacing = random.exponential(key, (n + 1,), dtype)
     used = jax.lax.iota(jnp.int32, n + 1) <= count
     cumulated = fence(_cumulative_sum(_as_parts(jnp.where(used, spacing, 0.0))))

@@ -8,15 +8,16 @@ import jax
 import jax.numpy as jnp
 
 _CORRECTIONS = 2
-"""Newton's steps from a root without derivatives: with each, twice as many and one more orders are right."""
+"""The number of Newton steps from a root without derivatives: if derivatives up to order k are right, a step makes them
+right up to order 2 k + 1."""
 
 
 def secant(function: Callable, arguments, x_0, x_1, tolerance, steps: int = 17):
-    """`x` with `|function(x, arguments)| <= tolerance`, elementwise, by the secant method from two first guesses.
+    """`x` with `|function(x, arguments)| <= tolerance`, elementwise, by the secant method from two initial guesses.
 
-    `function` maps an array and a tree of arrays to an array of the guesses' shape, each element by itself. An element stops
-    where it is within `tolerance`, all after `steps`. Derivatives up to the third are those of the root: the first is
-    `-(df / darguments) / (df / dx)`.
+    `function` maps an array and a tree of arrays to an array of the guesses' shape, elementwise. An element stops when
+    it is within `tolerance`, and all stop after `steps`. Derivatives up to the third are those of the root: the first
+    is `-(df / darguments) / (df / dx)`.
     """
 
     def step(carry):
@@ -37,7 +38,7 @@ def secant(function: Callable, arguments, x_0, x_1, tolerance, steps: int = 17):
     root = jax.lax.stop_gradient(root)
     for _ in range(_CORRECTIONS):
         value, slope = jax.jvp(lambda x: function(x, arguments), (root,), (jnp.ones_like(root),))
-        # Zero by value: it carries derivatives alone.
+        # Its value is zero: it has derivatives only.
         moved = value - jax.lax.stop_gradient(value)
         root = root - moved / jnp.where(slope == 0, jnp.ones_like(slope), slope)
     return root

@@ -1,8 +1,8 @@
-"""Scans whose steps are taken for a whole batch with its axis last (`batch_last`), and their derivatives.
+"""Scans whose steps are computed for a whole batch with its axis last (`batch_last`), and their derivatives.
 
-A step is a primitive, so that it is differentiated as it stands for one run, and its derivative is taken with the batch last,
-too. (Sums that are written out have derivatives that are sums of arrays of zeros with a slice in each: 256 gradients of an
-unscented filter of 11 states took 20 times as long.)
+A step is a primitive, so that it is differentiated in the form for one run, and its derivative is also computed with
+the batch last. (The derivatives of sums that are written out are sums of arrays of zeros with one slice in each: with
+them, 256 gradients of an unscented filter of 11 states took 20 times as long.)
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ PyTree = Any
 
 
 def scan_batch_last(body: Callable, start: PyTree, rows: PyTree, *, reverse: bool = False) -> tuple[PyTree, PyTree]:
-    """What `jax.lax.scan(body, start, rows, reverse=reverse)` gives, checkpointed; under `jax.vmap` with the batch's axis last.
+    """The result of `jax.lax.scan(body, start, rows, reverse=reverse)`, checkpointed; under `jax.vmap` with the batch's
+    axis last.
 
-    `rows` has at least one array. Differentiable, in both modes, as `body` is.
+    `rows` has at least one array. The scan is differentiable in both modes, like `body`.
     """
     carry, structure = jax.tree.flatten(start)
     leaves = jax.tree.leaves(rows)
@@ -50,7 +51,7 @@ def scan_batch_last(body: Callable, start: PyTree, rows: PyTree, *, reverse: boo
 
 
 def _parts(operands: Sequence[Any], fixed: int, carried: int) -> tuple[Sequence[Any], Sequence[Any], Sequence[Any]]:
-    """What every step has, the carry, and the rows."""
+    """The operands that every step has, the carry, and the rows."""
     return operands[:fixed], operands[fixed : fixed + carried], operands[fixed + carried :]
 
 
@@ -83,7 +84,7 @@ def _batch_of_scans(operands, axes, *, program, fixed: int, carried: int, revers
         found = _steps.bind(
             *always, *carry, *row, program=program, of_batch=tuple(of_batch), results=tuple(results), size=size
         )
-        # What the next row reads is computed once.
+        # Values that the next row uses are computed once.
         return fence(found[:carried]), found[carried:]
 
     end, shown = lax.scan(body, start, list(rows), reverse=reverse)
@@ -92,7 +93,7 @@ def _batch_of_scans(operands, axes, *, program, fixed: int, carried: int, revers
 
 
 def _spread(of_batch: list[bool], program: Any, fixed: int, carried: int, size: int) -> tuple[list[bool], list[bool]]:
-    """Which operands and results of a step are of the batch, after however many steps."""
+    """Which operands and results of a step are batched, after any number of steps."""
     while True:
         results: list[bool] = []
 
@@ -130,7 +131,7 @@ ad.primitive_jvps[_scan] = lambda primals, tangents, **how: jax.jvp(
 )
 
 
-# A step of a batch: `of_batch` says which operands and `results` which results have the batch's axis, of `size`.
+# A step of a batch of `size`: `of_batch` marks the operands and `results` the results that have the batch's axis.
 
 
 def _stepped(*operands: Any, program: Any, of_batch: tuple, results: tuple, size: int) -> list:
@@ -143,7 +144,7 @@ def _stepped(*operands: Any, program: Any, of_batch: tuple, results: tuple, size
 
 
 def _slopes(primals, tangents, *, program, of_batch: tuple, results: tuple, size: int) -> tuple[list, list]:
-    """A step and its derivative, which is another step."""
+    """The values of a step and their slopes, which are computed by another step."""
     values = _steps.bind(*primals, program=program, of_batch=of_batch, results=results, size=size)
     moves = [i for i, tangent in enumerate(tangents) if not isinstance(tangent, ad.Zero)]
     slopes = [ad.Zero(jax.core.ShapedArray(one.shape, jax.dtypes.float0)) for one in values]
@@ -162,7 +163,7 @@ def _back(cotangents, *operands, program, of_batch: tuple, results: tuple, size:
     linear = [i for i, one in enumerate(operands) if ad.is_undefined_primal(one)]
     known = [i for i in range(len(operands)) if i not in linear]
     given = [i for i, one in enumerate(cotangents) if not isinstance(one, ad.Zero)]
-    # What is the same for all is of each run its share: the runs' cotangents are added up below.
+    # A result that is the same for all runs gives each run its share of the cotangent: those of the runs are summed below.
     shares = [cotangents[i] if results[i] else cotangents[i] / size for i in given]
     found = _steps.bind(
         *(operands[i] for i in known), *shares,
@@ -177,7 +178,7 @@ def _back(cotangents, *operands, program, of_batch: tuple, results: tuple, size:
 
 @functools.lru_cache(maxsize=32)
 def _pushforward(program: Any, moves: tuple[int, ...], floating: tuple[int, ...]) -> Any:
-    """The slopes of the `floating` results as a program of all operands and the tangents of those that move."""
+    """The slopes of the `floating` results as a program of all operands and of the tangents of the operands `moves`."""
     avals = [_like(one, False, 0) for one in program.in_avals]
 
     def slopes(*operands):
@@ -192,7 +193,7 @@ def _pushforward(program: Any, moves: tuple[int, ...], floating: tuple[int, ...]
 
 @functools.lru_cache(maxsize=32)
 def _pullback(program: Any, linear: tuple[int, ...], given: tuple[int, ...]) -> Any:
-    """The cotangents of the `linear` operands as a program of the others and the cotangents of the `given` results."""
+    """The cotangents of the `linear` operands as a program of the other operands and the cotangents of the `given` results."""
     avals = [_like(one, False, 0) for one in program.in_avals]
     known = [i for i in range(len(avals)) if i not in linear]
 
@@ -216,7 +217,7 @@ def _with(several: Sequence[Any], places: Sequence[int], others: Sequence[Any]) 
 
 
 def _batch_of_steps(operands, axes, *, program, of_batch: tuple, results: tuple, size: int) -> tuple[list, list]:
-    """A batch of batches is one."""
+    """A batch of batches as one batch."""
     outer = next(one.shape[axis] for one, axis in zip(operands, axes, strict=True) if axis is not None)
     merged = []
     for one, axis, last, like in zip(operands, axes, of_batch, program.in_avals, strict=True):

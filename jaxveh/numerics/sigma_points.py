@@ -1,4 +1,4 @@
-"""Sigma points: fixed directions and weights that stand for a Gaussian in n dimensions."""
+"""Sigma points: fixed directions and weights that represent a Gaussian in n dimensions."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from jaxveh._core.errors import InputError
 
 GREATEST = 20_000
-"""More points than this are a mistake, not a rule."""
+"""The largest number of points of a rule; more are taken for a mistake."""
 
 
 class SigmaPoints:
     """Unit directions (n, p) as columns, and the weights (p,) of means and of covariances; host-side float64.
 
-    Two of equal numbers are equal, so that jit sees one structure.
+    Two sets of equal numbers are equal, so that jit sees one structure.
     """
 
     def __init__(self, directions: np.ndarray, mean_weights: np.ndarray, covariance_weights: np.ndarray | None = None):
@@ -59,7 +59,7 @@ def spherical_simplex(n: int, central: float = 0.0) -> SigmaPoints:
     for j in range(2, n + 1):
         last = np.append(np.full(j, -1.0), float(j))
         simplex = np.vstack([np.hstack([simplex, np.zeros((j - 1, 1))]), last / np.sqrt(j * (j + 1) / 2)])
-    # Each row of the simplex has the squares' sum 2, of which the weights make 1.
+    # The squares of each row of the simplex sum to 2; the weights reduce this to 1.
     directions = np.hstack([np.zeros((n, 1)), simplex / np.sqrt(2 * weight)])
     return SigmaPoints(directions, np.append(central, np.full(n + 1, weight)))
 
@@ -69,7 +69,7 @@ def cubature(n: int, degree: int = 3) -> SigmaPoints:
 
     Degree 3: +/- sqrt(n) along each axis (I. Arasaratnam & S. Haykin 2009). Degree 5: the centre with weight 2 / (n + 2),
     +/- sqrt(n+2) along each axis with (4 - n) / (2 (n+2)^2), and along each pair of axes with 1 / (n+2)^2 (J. McNamee &
-    F. Stenger 1967; B. Jia, M. Xin & Y. Cheng 2013); from n = 5 on it has negative weights.
+    F. Stenger 1967; B. Jia, M. Xin & Y. Cheng 2013); it has negative weights from n = 5 on.
     """
     if degree not in (3, 5):
         raise InputError(f"degree = {degree}: must be 3 or 5.")
@@ -93,7 +93,7 @@ def gauss_hermite(n: int, order: int = 3) -> SigmaPoints:
     if order < 2:
         raise InputError(f"order = {order}: must be at least 2.")
     if order**n > GREATEST:
-        raise InputError(f"{order}^{n} = {order**n} points: at most {GREATEST}; take Cubature or Unscented.")
+        raise InputError(f"{order}^{n} = {order**n} points: must be at most {GREATEST}; take Cubature or Unscented.")
     nodes, weights = np.polynomial.hermite_e.hermegauss(order)
     directions = np.array(list(itertools.product(nodes, repeat=n))).T
     products = np.prod(list(itertools.product(weights / weights.sum(), repeat=n)), axis=1)

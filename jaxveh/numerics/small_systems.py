@@ -6,10 +6,11 @@ from jax import Array
 
 
 def solve_scalars(lower: Sequence[Sequence[Array]], b: Sequence[Array]) -> list[Array]:
-    """x of A x = b for a symmetric, positive definite A whose rows up to the diagonal are `lower` (1, 2, ... n entries).
+    """The solution x of A x = b for a symmetric, positive definite A with the rows `lower` up to the diagonal
+    (1, 2, ... n entries).
 
-    Elementwise: entries broadcast against each other, there is no axis of rows. Cholesky's factorisation without roots,
-    A = L D L^T, written out; a matrix that is not positive definite is not noticed.
+    It works elementwise: entries broadcast against each other, without an axis of rows. It is Cholesky's factorisation
+    without roots, A = L D L^T, written out; it does not detect a matrix that is not positive definite.
     """
     unit: list[list] = []  # rows of L left of the diagonal
     pivots: list = []

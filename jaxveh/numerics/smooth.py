@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 
 def smooth_step(s: jax.Array) -> jax.Array:
-    """From 0 at s <= 0 to 1 at s >= 1, twice continuously differentiable: `10 s^3 - 15 s^4 + 6 s^5` between."""
+    """A step from 0 at s <= 0 to 1 at s >= 1, twice continuously differentiable: `10 s^3 - 15 s^4 + 6 s^5` in between."""
     s = jnp.clip(s, 0.0, 1.0)
     return s * s * s * (10.0 - s * (15.0 - 6.0 * s))
 
@@ -19,7 +19,7 @@ def smooth_bump(s: jax.Array) -> jax.Array:
 
 
 def smooth_ramp(x: jax.Array, width: jax.Array | float) -> jax.Array:
-    """The integral of a `smooth_step` from -`width` to `width` (positive): 0 below, exactly x above.
+    """The integral of a `smooth_step` from -`width` to `width` (positive): 0 below -`width`, exactly x above `width`.
 
     Three times continuously differentiable, never negative, and `smooth_ramp(x) - smooth_ramp(-x) = x`.
     """
@@ -29,7 +29,7 @@ def smooth_ramp(x: jax.Array, width: jax.Array | float) -> jax.Array:
 
 
 def smooth_clip(x: jax.Array, low, high, width: jax.Array | float) -> jax.Array:
-    """x held between `low` and `high`: exactly x, `low` or `high` further than `width` from the two corners.
+    """x limited to the range from `low` to `high`: exactly x, `low` or `high` at more than `width` from the two corners.
 
     Three times continuously differentiable; `width` is positive and at most half of `high - low`.
     """

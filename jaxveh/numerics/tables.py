@@ -1,4 +1,4 @@
-"""Tables over an axis, linear or smooth between their points, held at the ends."""
+"""Tables over an axis, linear or smooth between their points, constant beyond the ends."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ import jax.numpy as jnp
 
 
 def interpolate_linear(x: jax.Array, points: jax.Array, values: jax.Array) -> jax.Array:
-    """Straight lines between `points` (n,), rising, n >= 2, with `values` (n,); held beyond. The shape of x."""
+    """Linear interpolation between `points` (n,), rising, n >= 2, with `values` (n,); constant beyond. The result has the
+    shape of x."""
     left, share, _ = _place(x, points)
     return values[left] + share * (values[left + 1] - values[left])
 
 
 def interpolate_smooth(x: jax.Array, points: jax.Array, values: jax.Array) -> jax.Array:
-    """Cubics between `points` (n,), rising, n >= 2, with `values` (n,), once continuously differentiable; held beyond.
+    """Cubic interpolation between `points` (n,), rising, n >= 2, with `values` (n,); once continuously differentiable,
+    constant beyond the ends.
 
-    Never beyond the two values it lies between (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984)):
-    the slope at an inner point is the weighted harmonic mean of its neighbours' and zero at a peak; at the two ends it
-    is zero, because the table is held there.
+    Between two points the result stays between their values (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat. Comput. 5
+    (1984)): the slope at an inner point is the weighted harmonic mean of the slopes on both sides, and zero at a peak.
+    At the two ends it is zero, because the table is constant beyond.
     """
     left, share, step = _place(x, points)
     slopes = _slopes(points, values)
@@ -28,11 +30,11 @@ def interpolate_smooth(x: jax.Array, points: jax.Array, values: jax.Array) -> ja
 
 
 def _place(x, points):
-    """The point to the left, how far x is on the way to the next (0 to 1), and how long the way is."""
+    """The index of the point to the left, the position of x between it and the next point (0 to 1), and their distance."""
     left = jnp.clip(jnp.searchsorted(points, x, side="right"), 1, points.shape[0] - 1) - 1
     step = points[left + 1] - points[left]
     share = (x - points[left]) / step
-    # Unlike a clip this has the whole slope at the points themselves.
+    # Unlike a clip, this has the full slope at the end points.
     return left, jnp.where(x < points[0], 0.0, jnp.where(x > points[-1], 1.0, share)), step
 
 

@@ -1,4 +1,4 @@
-"""A value that carries derivatives alone."""
+"""A zero value with derivatives."""
 
 import jax.numpy as jnp
 from jax import Array
@@ -7,10 +7,10 @@ from jax.interpreters import ad, batching, mlir
 
 
 def derivative_alone(x: Array) -> Array:
-    """Zero, with all derivatives of `x`, of its shape; XLA computes nothing of `x` where no derivative is asked for.
+    """Zero, with all derivatives of `x`, of its shape; XLA does not compute `x` if no derivative is needed.
 
-    A primitive, because jax before 0.12 drops derivative rules of functions from the values that the backward pass of a scan
-    keeps, and `x - stop_gradient(x)` would cost what `x` costs.
+    It is a primitive, because jax before 0.12 drops derivative rules of functions from the values that the backward
+    pass of a scan keeps, and because `x - stop_gradient(x)` would cost as much as `x`.
     """
     return _alone.bind(x)
 

@@ -1,4 +1,4 @@
-"""Triangular factors of A A^T without forming it: what square-root filters are made of."""
+"""Triangular factors of A A^T without forming it, for square-root filters."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ def lower_factor(matrix: Array) -> Array:
     """Lower triangular L (n, n) with a diagonal >= 0 and L L^T = A A^T, for a matrix A (n, k).
 
     The transposed R of a QR decomposition of A^T, by the modified Gram-Schmidt process, whose R is as accurate as
-    Householder's (A. Bjorck, Numerical Methods for Least Squares Problems, sec. 2.4.4): no covariance is formed, so that
-    L has the digits that a Cholesky factor of A A^T loses.
+    Householder's (A. Bjorck, Numerical Methods for Least Squares Problems, sec. 2.4.4): no covariance is formed, so
+    that L keeps the digits that a Cholesky factor of A A^T loses.
 
     The derivative is that of the equation L L^T = A A^T: with A = L Q^T and Z = L^-1 dA Q,
 
         dL = L low(Z + Z^T),    low: the lower triangle with half of the diagonal.
 
-    Where A has a lower rank, L has zeros on its diagonal, and there the derivative leaves out what is not defined.
+    Where A has a lower rank, L has zeros on its diagonal, and there the derivative leaves out its undefined part.
     """
     return _orthogonalise(matrix)[0]
 
@@ -32,7 +32,7 @@ def _lower_factor_jvp(primals, tangents):
     (matrix,), (change,) = primals, tangents
     factor, turned = _orthogonalise(matrix)
     diagonal = jnp.diagonal(factor)
-    # A row that depends on those before has nothing of its own to divide by.
+    # A row that depends linearly on those before has a zero pivot, which must not be a divisor.
     regular = factor + jnp.diag(jnp.where(diagonal > 0, 0, 1).astype(factor.dtype))
     inner = solve_lower(regular, _times(change, turned.T))
     both = inner + inner.T
@@ -41,7 +41,8 @@ def _lower_factor_jvp(primals, tangents):
 
 
 def _orthogonalise(matrix: Array) -> tuple[Array, Array]:
-    """L (n, n) and Q^T (n, k) with A = L Q^T; rows of Q^T are orthonormal, or zero where A's depend on those before."""
+    """L (n, n) and Q^T (n, k) with A = L Q^T; rows of Q^T are orthonormal, or zero where a row of A depends linearly on
+    those before."""
     n = matrix.shape[0]
     columns, directions, rest = [], [], matrix
     for i in range(n):
@@ -57,5 +58,6 @@ def _orthogonalise(matrix: Array) -> tuple[Array, Array]:
 
 
 def _times(a: Array, b: Array) -> Array:
-    """(n, k) (k, m) as a sum that XLA fuses: its library's products round with the place of the operands in memory."""
+    """The product (n, k) (k, m) as a sum that XLA fuses: its library's products round depending on the operands' place
+    in memory."""
     return jnp.sum(a[:, None, :] * b.T[None], axis=-1)

@@ -1,8 +1,8 @@
-"""Functions of small arrays written out in scalars, as one would by hand for speed.
+"""Functions of small arrays written out in scalars, for speed.
 
-Under `jax.vmap` each scalar is an array over the batch, on which XLA's loops are as long as they can be; a batch of 3 by 3
-matrices it takes one by one. 1000 unscented filters of three states then take a fourteenth of the time (28 instead of 400 ns a
-run-step, jax 0.12, float64, log-likelihoods alone).
+Under `jax.vmap` each scalar becomes an array over the batch, so that XLA's loops run along the batch; it would take a
+batch of 3 by 3 matrices one by one. 1000 unscented filters of three states then take a fourteenth of the time (28
+instead of 400 ns per run and step, jax 0.12, float64, log-likelihoods only).
 """
 
 from __future__ import annotations
@@ -22,19 +22,20 @@ from jaxveh.numerics.entries import Entries, array_of, entries, entry_list, is_k
 from jaxveh.numerics.fences import fence
 
 CALLS = ("pjit", "jit", "closed_call", "core_call", "remat", "remat2", "checkpoint")
-"""Primitives that run a program of their own once."""
+"""Primitives that run an inner program once."""
 
 FENCES = ("jaxveh_fence", "optimization_barrier")
 
 WHOLE = "jaxveh_whole"
-"""Name of functions `as_whole`."""
+"""The name of functions that are wrapped by `as_whole`."""
 
 LONG = 1500
-"""Scalars from which on a function `as_whole` is left as it is: written out, it would compile for longer than it saves."""
+"""The largest number of scalars for which a function `as_whole` is written out: beyond it, compiling takes longer than
+it saves."""
 
 
 def as_whole(function: Callable) -> Callable:
-    """The function, which `scan_written_out` takes on whole arrays where it would be more than `LONG` scalars."""
+    """The function, marked so that `scan_written_out` computes it on whole arrays if it would be more than `LONG` scalars."""
 
     def jaxveh_whole(*operands):
         return function(*operands)
@@ -43,7 +44,7 @@ def as_whole(function: Callable) -> Callable:
 
 
 def scalars_of(program: Any) -> int:
-    """About how many scalars a jaxpr is, written out."""
+    """Approximately the number of scalars of a jaxpr that is written out."""
     jaxpr = program.jaxpr if hasattr(program, "jaxpr") else program
     count = 0
     for equation in jaxpr.eqns:
@@ -58,11 +59,11 @@ PyTree = Any
 def scan_written_out(
     body: Callable, start: PyTree, rows: PyTree, *, reverse: bool = False, complete: bool = False
 ) -> tuple[PyTree, PyTree]:
-    """What `jax.lax.scan(body, start, rows, reverse=reverse)` gives, with the body written out in scalars, and checkpointed.
+    """The result of `jax.lax.scan(body, start, rows, reverse=reverse)`, with the body written out in scalars and checkpointed.
 
-    `rows` has at least one array. The carry is so many scalars, too. Differentiable, in both modes, as `body` is; a product of a
-    known zero and NaN is zero. `complete`: every number of `rows` is finite, so that what depends on what is missing alone is
-    known when it is traced.
+    `rows` has at least one array. The carry is written out in scalars, too. The scan is differentiable in both modes,
+    like `body`; a product of a known zero and NaN is zero. `complete`: every number of `rows` is finite, so that values
+    that depend only on missing measurements are known when traced.
     """
     carried, structure = jax.tree.flatten(start)
     row = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(np.shape(leaf)[1:], leaf.dtype), rows)
@@ -75,7 +76,7 @@ def scan_written_out(
         found = evaluate(
             closed, split(carry, [one.shape for one in inner]) + given, entry_list(given) if complete else ()
         )
-        # What the next row reads is computed once.
+        # Values that the next row uses are computed once.
         return fence(_scalars(found[: len(inner)], inner)), _scalars(found[len(inner) :], outer)
 
     first = _scalars([entries(leaf) for leaf in carried], inner)
@@ -146,24 +147,25 @@ def _results(equation: Any, operands: list[Entries], finite: Sequence[Any]) -> l
 
 
 def _is_ruled(params: dict[str, Any], equation: Any) -> bool:
-    """Whether a function with a derivative of its own can be taken apart: its rule is at hand, and it is of floating numbers."""
+    """Whether a function with a derivative rule can be written out: the rule is available, and all operands are
+    floating point."""
     floating = all(jnp.issubdtype(one.aval.dtype, jnp.floating) for one in equation.invars)
     return floating and params.get("num_consts") == 0 and hasattr(params.get("jvp_jaxpr_fun"), "call_wrapped")
 
 
 def _scalars(found: Sequence[Entries], like: Sequence[Any]) -> list[jax.Array]:
-    """The entries of results as scalars of JAX, each of the dtype of its array."""
+    """The entries of results as JAX scalars, each of the dtype of its array."""
     return [scalar_of(entry, one.dtype) for those, one in zip(found, like, strict=True) for entry in those.reshape(-1)]
 
 
 def _fenced(several: list[Entries]) -> list[Entries]:
-    """All that is not known behind one barrier."""
+    """The arrays, where all entries that are not known pass one barrier."""
     places, fill = _filled(items := entry_list(several))
     return split(fill(fence([items[i] for i in places])), [one.shape for one in several])
 
 
 def _filled(items: list) -> tuple[list[int], Callable[[Any], list]]:
-    """The places of what is not known, and the items with other values there."""
+    """The places of the items that are not known, and a function that returns the items with other values there."""
     places = [i for i, item in enumerate(items) if not is_known(item)]
 
     def fill(some):
@@ -176,7 +178,7 @@ def _filled(items: list) -> tuple[list[int], Callable[[Any], list]]:
 
 
 def _branches(branches: Any, operands: list[Entries], out: list, finite: Sequence[Any]) -> list[Entries]:
-    """A conditional of one predicate, with branches that are written out."""
+    """A conditional with one predicate, whose branches are written out."""
     index, *rest = operands
     if is_known(index[()]):
         return evaluate(branches[int(index[()])], rest, finite)
@@ -194,7 +196,7 @@ def _branches(branches: Any, operands: list[Entries], out: list, finite: Sequenc
 
 
 def _with_rule(params: dict[str, Any], operands: list[Entries], given: list, out: list) -> list[Entries]:
-    """A function with a derivative of its own (`jax.custom_jvp`), both written out."""
+    """A function with a derivative rule (`jax.custom_jvp`), both written out."""
     items, shapes = entry_list(operands), [one.shape for one in operands]
     dtypes = [one.dtype for one in given for _ in range(math.prod(one.shape))]
     places, fill = _filled(items)
@@ -223,19 +225,19 @@ def _with_rule(params: dict[str, Any], operands: list[Entries], given: list, out
 
 
 def _whole(equation: Any, operands: list[Entries]) -> list[Entries]:
-    """An equation that nothing is known of here, on whole arrays."""
+    """The results of an equation without a rule here, on whole arrays."""
     variables, arrays = [], []
     for one, those in zip(equation.invars, operands, strict=True):
         if not isinstance(one, core.Literal) and one not in variables:
             variables.append(one)
             arrays.append(array_of(those, one.aval.dtype))
-    # Else each entry would be computed from the beginning, with all that it is made of.
+    # Without fences each entry would be computed from the beginning, with everything that it depends on.
     found = fence(core.jaxpr_as_fun(alone(equation, variables))(*fence(arrays)))
     return [entries(one) for one in found]
 
 
 def alone(equation: Any, variables: list) -> core.ClosedJaxpr:
-    """One equation as a program of these variables, which are all that it reads."""
+    """One equation as a program of these variables, which must be all variables that it reads."""
     empty = jax.make_jaxpr(lambda: ())().jaxpr
     jaxpr = empty.replace(
         constvars=[], invars=variables, outvars=list(equation.outvars), eqns=[equation], effects=equation.effects,
@@ -245,17 +247,17 @@ def alone(equation: Any, variables: list) -> core.ClosedJaxpr:
 
 
 APART = 36
-"""Numbers of an array up to which its entries are taken apart."""
+"""The largest number of entries of an array that `as_entries` splits."""
 
 
 def as_entries(tree: PyTree) -> PyTree:
-    """The tree with the scalars of each array in its place: what `scan_written_out` stacks then are single columns."""
+    """The tree with small arrays replaced by tuples of their scalars, so that `scan_written_out` stacks single columns."""
     few = lambda leaf: np.ndim(leaf) > 0 and np.size(leaf) <= APART
     return jax.tree.map(lambda leaf: tuple(entries(leaf).reshape(-1)) if few(leaf) else leaf, tree)
 
 
 def from_entries(tree: PyTree, like: PyTree) -> PyTree:
-    """What `as_entries` gave, as the arrays of `like`."""
+    """The inverse of `as_entries`: arrays in the shapes of `like`."""
     leaves, structure = jax.tree.flatten(like)
     whole = lambda found, one: jnp.stack(found).reshape(np.shape(one)) if isinstance(found, tuple) else found
     return jax.tree.unflatten(

@@ -1,4 +1,4 @@
-"""What a car measures: sets of channels as filters see them, and devices that speak as those of a real car do."""
+"""The sensors of a car: sets of channels for filters, and devices with the rates, delays and errors of those in a real car."""
 
 from jaxveh.sensors.camera import LaneCamera
 from jaxveh.sensors.device import AbstractDevice, AbstractInstrument

@@ -1,4 +1,4 @@
-"""The camera that sees the lane: where the car is in it, and how it stands against it, a few times a second and late."""
+"""The lane camera: lateral offset and heading of the car in its lane, with a low rate and a delay."""
 
 from __future__ import annotations
 
@@ -21,21 +21,22 @@ _LOST = "lost"
 
 
 class LaneCamera(AbstractSignalInstrument):
-    """A camera behind the windscreen whose program finds the lines of the lane.
+    """A camera behind the windscreen that detects the lines of the lane.
 
-    - `signals`: the channels and their errors, a mapping to `Signal`, out of `lane_offset` (m, how far to the left of the lane's
-      middle the car is at the camera) and `lane_heading` (rad, the car's yaw less the lane's direction there, within -pi to pi);
-      names alone have no errors.
-    - The lane's middle lies at `y = middle + sway sin(2 pi x / wavelength)` in the world (m): a straight lane along x without
-      `sway`.
-    - `position`: of the camera from the centre of gravity; its height does not count, and pitch and roll are taken out by
-      whoever calibrated it.
-    - `reach` (m): from farther beside the middle no line is seen, NaN. `loss_rate` (1/s) and `loss_length` (mean, s): the lines
-      are lost at random (worn paint, wipers, low sun). In both cases all channels are silent.
+    - `signals`: a mapping from channels to their errors (`Signal`). The channels are `lane_offset` (m, the distance of
+      the camera to the left of the lane's middle) and `lane_heading` (rad, the car's yaw less the lane's direction
+      there, within -pi to pi). Channels given as names only have no errors.
+    - The lane's middle lies at `y = middle + sway sin(2 pi x / wavelength)` in the world (m): without `sway`, a
+      straight lane along x.
+    - `position`: position of the camera from the centre of gravity. Its height has no effect, and pitch and roll are
+      taken as compensated by its calibration.
+    - `reach` (m): at a larger distance from the middle no line is detected. `loss_rate` (1/s) and `loss_length`
+      (mean, s): the lines are lost at random (worn paint, wipers, low sun). In both cases all channels are NaN.
 
-    A usual camera: 30 Hz, 80 ms late, `lane_offset` to 0.03 m and `lane_heading` to 0.2 degrees.
+    A typical camera has 30 Hz, a delay of 80 ms, and errors of 0.03 m in `lane_offset` and 0.2 degrees in `lane_heading`.
 
-    **Raises** `InputError` for unknown channels or numbers out of range, or a rate of losses without their length.
+    **Raises** `InputError` for unknown channels or numbers out of range, or for `loss_rate` without `loss_length` or
+    the reverse.
     """
 
     known: ClassVar[dict[str, str]] = {"lane_offset": "m", "lane_heading": "rad"}
@@ -58,23 +59,23 @@ class LaneCamera(AbstractSignalInstrument):
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Place and yaw in the world."""
+        """Position and yaw in the world."""
         return ("x", "y", "yaw")
 
     @property
     def may_use(self) -> tuple[str, ...]:
-        """Nothing else."""
+        """No further outputs."""
         return ()
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
-        """Offset and heading; NaN where no line is seen."""
+        """Offset and heading; NaN where no line is detected."""
         yaw = outputs["yaw"]
         c, s = numerics.cos(yaw), numerics.sin(yaw)
         x = outputs["x"] + c * self.position.x - s * self.position.y
         y = outputs["y"] + s * self.position.x + c * self.position.y
         turns = 2.0 * jnp.pi / self.wavelength
         slope = self.sway * turns * numerics.cos(turns * x)
-        # Across the lane, of a line whose direction changes little within the offset.
+        # Perpendicular to the lane, if its direction changes little within the offset.
         offset = (y - self.middle - self.sway * numerics.sin(turns * x)) / numerics.sqrt(1.0 + jnp.square(slope))
         heading = numerics.wrap_angle(yaw - numerics.arctan(slope))
         said = self.sent_values({"lane_offset": offset, "lane_heading": heading}, key)

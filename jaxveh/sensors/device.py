@@ -1,6 +1,6 @@
-"""The one contract of a device: what it looks at, when it speaks, and what it says."""
+"""The contract of a device: the vehicle outputs that it uses, its sample times, and its channels."""
 
-# No postponed annotations here: equinox does not see an AbstractVar in a string.
+# No postponed annotations here: equinox does not recognise an AbstractVar in a string.
 
 import abc
 import math
@@ -20,20 +20,20 @@ _ROUNDING = 1e-9
 
 
 class AbstractDevice(eqx.Module):
-    """A measuring device on a car: it looks at vehicle outputs and speaks `rate` times a second.
+    """A measuring device on a car: it measures vehicle outputs and sends samples at `rate`.
 
-    - `rate` (Hz), `phase` (s): it speaks at `phase + k / rate`, k = 0, 1, ...
-    - `delay` (s): what it says at t is what was true at `t - delay` (at 0 for t < delay). These three are static.
-    - `channels`: the names it says, `units` their units. `needs`: the vehicle outputs it looks at; `may_use`: those it
-      looks at where the car has them.
+    - `rate` (Hz), `phase` (s): it sends a sample at `phase + k / rate`, k = 0, 1, ...
+    - `delay` (s): the sample sent at t is of the outputs at `t - delay` (at 0 for t < delay). These three are static.
+    - `channels`: the names of its channels, `units` their units. `needs`: the vehicle outputs that it requires;
+      `may_use`: further outputs that it uses if the car has them.
 
-    Vehicle outputs are of ISO 8855's intermediate axes (road-parallel, turned with the car's yaw), SI units: `v_x`,
-    `v_y`, `yaw`, `yaw_rate`, `yaw_acceleration`, `a_x`, `a_y`, `a_z` (specific force at the centre of gravity: what an
-    ideal accelerometer there shows), `x`, `y` (world), `roll` (left side up), `pitch` (nose down), their rates and
-    accelerations (of these two angles), `omega_fl` ... (wheel spins; `omega_to_body_fl` ... as seen from a body that
-    pitches), `steer`, `drive_torque` and so on.
+    Vehicle outputs are in ISO 8855's intermediate axes (road-parallel, turned with the car's yaw), in SI units: `v_x`,
+    `v_y`, `yaw`, `yaw_rate`, `yaw_acceleration`, `a_x`, `a_y`, `a_z` (specific force at the centre of gravity, as an
+    ideal accelerometer measures it there), `x`, `y` (world), `roll` (left side up), `pitch` (nose down), their rates
+    and accelerations (of these two angles), `omega_fl` ... (wheel spins; `omega_to_body_fl` ... are relative to a body
+    that pitches), `steer`, `drive_torque` and so on.
 
-    Array leaves are the errors' sizes: readings may be jitted, vmapped over keys and differentiated.
+    Array leaves are the sizes of the errors. `read` can be jitted, vmapped over keys and differentiated.
     """
 
     rate: eqx.AbstractVar[float]
@@ -43,7 +43,7 @@ class AbstractDevice(eqx.Module):
     @property
     @abc.abstractmethod
     def channels(self) -> tuple[str, ...]:
-        """The names of what it says."""
+        """The names of the channels that it measures."""
 
     @property
     @abc.abstractmethod
@@ -53,41 +53,41 @@ class AbstractDevice(eqx.Module):
     @property
     @abc.abstractmethod
     def needs(self) -> tuple[str, ...]:
-        """The vehicle outputs that it cannot do without."""
+        """The vehicle outputs that it requires."""
 
     @property
     @abc.abstractmethod
     def may_use(self) -> tuple[str, ...]:
-        """The vehicle outputs that it looks at where there are any."""
+        """Further vehicle outputs that it uses if the car has them."""
 
     @abc.abstractmethod
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
-        """What `read` returns, of outputs that it has checked: `needs` are there, all are arrays (n,) of one dtype."""
+        """The result of `read`, for outputs that `read` has checked: all of `needs` are present, as arrays (n,) of one dtype."""
 
     @property
     def period(self) -> float:
-        """Time between two samples, s."""
+        """The time between two samples, s."""
         return 1.0 / self.rate
 
     def sample_times(self, duration: float) -> np.ndarray:
-        """The instants in [0, duration] at which it speaks, s, on the host; none where `phase` is beyond `duration`."""
+        """The instants in [0, duration] at which it sends samples, s, on the host; none if `phase` is beyond `duration`."""
         check_at_least("duration", duration, 0.0)
         check_finite("duration", duration)
         count = math.floor((duration - self.phase) * self.rate + _ROUNDING) + 1
         return np.arange(max(count, 0)) / self.rate + self.phase
 
     def look_times(self, duration: float) -> np.ndarray:
-        """The instants that it looks at, one a sample: `delay` earlier, not before 0."""
+        """The instants at which it measures, one per sample: `delay` earlier, not before 0."""
         return np.maximum(self.sample_times(duration) - self.delay, 0.0)
 
     def read(self, times: Any, outputs: Mapping[str, Any] | Any, key: Any = None) -> dict[str, jax.Array]:
-        """What the device says at `times` (n,), consecutive instants of `sample_times`: an (n,) array by channel.
+        """The device's samples at `times` (n,), consecutive instants of `sample_times`: an (n,) array by channel.
 
-        `outputs`: a mapping or NamedTuple of (n,) arrays, the vehicle's outputs at the instants that the device looks
-        at (`look_times`). They set the dtype, to which the device's own numbers are converted. NaN where nothing
-        is said. `key` draws what is random; without a key nothing is.
+        `outputs`: a mapping or NamedTuple of (n,) arrays, the vehicle's outputs at the instants at which the device
+        measures (`look_times`). They set the dtype, to which the device's own numbers are converted. Missing samples
+        are NaN. `key`: for random errors; without a key there are none.
 
-        **Raises** `InputError` for an output that the device needs and the car lacks, or of another shape.
+        **Raises** `InputError` for a missing output that the device needs, or an output of another shape.
         """
         outputs = self._look(np.shape(times), as_mapping(outputs, "outputs"))
         dtype = next(iter(outputs.values())).dtype
@@ -109,9 +109,9 @@ class AbstractDevice(eqx.Module):
 
 
 class AbstractInstrument(AbstractDevice):
-    """A device with a clock of its own, as opposed to one that wraps another.
+    """A device with its own clock, as opposed to one that wraps another device.
 
-    **Raises** `InputError` for a rate that is not positive, a negative delay or phase.
+    **Raises** `InputError` for a rate that is not positive, or a negative delay or phase.
     """
 
     rate: float = eqx.field(static=True, converter=float, kw_only=True)
@@ -127,15 +127,15 @@ class AbstractInstrument(AbstractDevice):
 
 
 def name_of(device: AbstractDevice) -> str:
-    """What messages call a device: its class."""
+    """The name of a device in messages: its class."""
     return type(device).__name__
 
 
 def check_outputs(device: AbstractDevice, outputs: Mapping[str, Any]) -> None:
-    """Raise unless the car has every output that the device needs."""
+    """Raise `InputError` unless the car has every output that the device needs."""
     missing = [name for name in device.needs if name not in outputs]
     if missing:
         raise InputError(
-            f"{name_of(device)} looks at {', '.join(missing)}, which this car does not have; there are: "
-            f"{', '.join(outputs) or 'none'}. Take a car that has them, or leave the device out."
+            f"{name_of(device)} needs {', '.join(missing)}, which this car does not have; there are: "
+            f"{', '.join(outputs) or 'none'}. Use a car that has them, or leave the device out."
         )

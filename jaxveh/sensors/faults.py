@@ -1,6 +1,6 @@
-"""Faults of devices: each wraps a device and acts on what it says (after delay, limits and rounding)."""
+"""Faults of devices: each wraps a device and acts on its samples (after delay, limits and rounding)."""
 
-# No postponed annotations here: equinox does not see an AbstractVar in a string.
+# No postponed annotations here: equinox does not recognise an AbstractVar in a string.
 
 import abc
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ def _names_or_none(channel) -> tuple[str, ...] | None:
 
 
 class AbstractFault(AbstractDeviceWrapper):
-    """A fault in some of a device's channels (None: in all); times are those at which the device speaks, s."""
+    """A fault in some of a device's channels (None: in all); times are the device's sample times, s."""
 
     channel: eqx.AbstractVar[tuple[str, ...] | None]
 
@@ -42,20 +42,20 @@ class AbstractFault(AbstractDeviceWrapper):
 
     @abc.abstractmethod
     def spoil(self, times: jax.Array, said: Channels, key: Any) -> Channels:
-        """What becomes of the faulty channels, a mapping to (n,) arrays."""
+        """The faulty channels with their fault, a mapping to (n,) arrays."""
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The inner device's."""
+        """The channels of the inner device."""
         return self.device.channels
 
     @property
     def units(self) -> dict[str, str]:
-        """The inner device's."""
+        """The units of the inner device's channels."""
         return self.device.units
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> Channels:
-        """What the inner device says, spoilt in the faulty channels."""
+        """The samples of the inner device, with the fault in the faulty channels."""
         said = self.device.say(times, outputs, key)
         faulty = self.channels if self.channel is None else self.channel
         return said | self.spoil(times, {name: said[name] for name in faulty}, self.own_key(key))
@@ -76,9 +76,9 @@ class BiasStep(AbstractFault):
 
 
 class Stuck(AbstractFault):
-    """From `start` to before `end` (s; None: for good), `channel` (a name or several) says its last value before `start`.
+    """From `start` to before `end` (s; None: for good), `channel` (a name or several) repeats its last value before `start`.
 
-    A channel that has said nothing yet is stuck at its first value, and one that was silent (NaN) stays silent.
+    A channel without a sample before `start` is stuck at its first value. A channel whose last sample was NaN stays NaN.
 
     **Raises** `InputError` for an end that is not after the start.
     """
@@ -103,9 +103,9 @@ class Stuck(AbstractFault):
 class Spikes(AbstractFault):
     """Each sample of `channel` (a name or several) is off by `size`, of random sign, with `probability`.
 
-    Channels are hit one by one. Without a key there are none.
+    Each channel has its own spikes. Without a key there are none.
 
-    **Raises** `InputError` for a probability beyond 0 to 1 or a size that is not positive.
+    **Raises** `InputError` for a probability outside 0 to 1 or a size that is not positive.
     """
 
     device: AbstractDevice
@@ -124,18 +124,18 @@ class Spikes(AbstractFault):
 
     def _spikes(self, key: Any, like: jax.Array) -> jax.Array:
         u = numerics.uniform(key, like.shape, like.dtype)
-        # The half of the probability that the number falls into decides on the sign.
+        # The sign depends on the half of the probability into which the number falls.
         spike = jnp.where(u < 0.5 * self.probability, -self.size, self.size)
         return jnp.where(u < self.probability, spike, 0.0)
 
 
 class Dropout(AbstractFault):
-    """`channel` (a name, several, or None for all) says nothing (NaN) in `spans`, and with `probability` a sample.
+    """`channel` (a name, several, or None for all) has no samples (NaN) in `spans`, and loses each sample with `probability`.
 
-    `spans`: ((start, end), ...) in s. The channels fall silent together, as when a message is lost; for others wrap
-    once more. Without a key there are the spans alone.
+    `spans`: ((start, end), ...) in s. The channels are lost together, as when a message is lost; for gaps at different
+    times, wrap it once more. Without a key, only the spans have gaps.
 
-    **Raises** `InputError` for reversed spans, a probability beyond 0 to 1, or neither of the two.
+    **Raises** `InputError` for reversed spans, a probability outside 0 to 1, or neither of the two.
     """
 
     device: AbstractDevice
@@ -147,7 +147,7 @@ class Dropout(AbstractFault):
         check_spans("Dropout.spans", self.spans)
         check("Dropout.probability", self.probability, lambda p: (p >= 0) & (p <= 1), "between 0 and 1")
         if not self.spans and self.probability is None:
-            raise InputError("Dropout: neither spans nor a probability; give at least one of them.")
+            raise InputError("Dropout: has neither spans nor a probability; give at least one of them.")
 
     def spoil(self, times: jax.Array, said: Channels, key: Any) -> Channels:
         """The channels with their gaps."""

@@ -1,4 +1,4 @@
-"""Satellite navigation: speed and course over ground and, where wanted, position, a few times a second and late."""
+"""Satellite navigation: speed and course over ground and, optionally, position, with a low rate and a delay."""
 
 from __future__ import annotations
 
@@ -25,21 +25,22 @@ _MORE_UNITS = {"heading": "rad", "climb_rate": "m/s"}
 
 
 class GNSS(AbstractInstrument):
-    """A receiver that says `speed` (m/s) and `course` (rad) of its antenna over ground and, with `position`, `x`, `y`.
+    """A receiver that measures `speed` (m/s) and `course` (rad) of its antenna over ground and, with `position`, its
+    position `x`, `y` (m).
 
     - `along`, `across` (m/s): standard deviations of the measured velocity along and across the true one; white. The
-      course is the measured velocity's angle from the world's x axis, positive to the left, within -pi to pi.
+      course is the angle of the measured velocity from the world's x axis, positive to the left, within -pi to pi.
     - `lowest` (m/s): below this measured speed the course is undefined, NaN.
-    - `position`: a `Signal` with the errors (m) of x and of y, each drawn for itself; the world's axes are the car's.
-      Receivers' positions wander slowly: give it a `drift` and a `drift_time`. None: no position is said.
-    - `antenna`: its `Position` from the centre of gravity. `heading`: a `Signal` with the errors (rad) of what a second antenna
-      tells, the yaw, as `heading` within -pi to pi, at standstill too. None: there is no second antenna.
-    - `climb`: a `Signal` with the errors (m/s) of the vertical speed, `climb_rate`, positive upwards, of a car that follows its
-      road; of a car that says no `grade`, on a level one. None: it is not said.
-    - `outages`: spans ((start, end), ...) in s in which nothing is said; `outage_rate` (1/s) and `outage_length`
-      (mean, s) add random ones.
+    - `position`: a `Signal` with the errors (m) of x and of y, drawn independently, in the world axes of the vehicle's
+      outputs. The position of a real receiver wanders slowly: give it a `drift` and a `drift_time`. None: no position.
+    - `antenna`: its `Position` from the centre of gravity. `heading`: a `Signal` with the errors (rad) of the channel
+      `heading`, the yaw from a second antenna, within -pi to pi, also at standstill. None: there is no second antenna.
+    - `climb`: a `Signal` with the errors (m/s) of the vertical speed, `climb_rate`, positive upwards, of a car that
+      follows its road; without an output `grade` the road is level. None: it is not measured.
+    - `outages`: spans ((start, end), ...) in s without samples (NaN); `outage_rate` (1/s) and `outage_length` (mean, s)
+      add random outages.
 
-    **Raises** `InputError` for numbers out of range, reversed spans, a rate of outages without their length.
+    **Raises** `InputError` for numbers out of range, reversed spans, or `outage_rate` without `outage_length` or the reverse.
     """
 
     along: jax.Array | None = positive("m/s", default=None)
@@ -71,24 +72,24 @@ class GNSS(AbstractInstrument):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Speed and course, and the position, heading and vertical speed where it has them."""
+        """Speed and course, and position, heading and vertical speed if the receiver measures them."""
         own = tuple(_UNITS)[: 2 if self.position is None else 4]
         more = {"heading": self.heading, "climb_rate": self.climb}
         return (*own, *(name for name, signal in more.items() if signal is not None))
 
     @property
     def units(self) -> dict[str, str]:
-        """m/s, rad, m."""
+        """The unit of each channel: m/s, rad or m."""
         return {name: (_UNITS | _MORE_UNITS)[name] for name in self.channels}
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Velocity and heading, and the position where it is said."""
+        """Velocity and heading, and the position if it is measured."""
         return ("v_x", "v_y", "yaw", "yaw_rate", *(("x", "y") if self.position is not None else ()))
 
     @property
     def may_use(self) -> tuple[str, ...]:
-        """How the body stands on the road, for the antenna; the road in space."""
+        """Roll and pitch of the body and their rates, for the antenna; with `climb`, also grade and bank."""
         return POSES if self.climb is None else (*POSES, "grade", "bank")
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:

@@ -1,4 +1,4 @@
-"""The inertial measurement unit: accelerometers and gyroscopes in one box that is fixed to the body."""
+"""The inertial measurement unit: accelerometers and gyroscopes in one box fixed to the body."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from jaxveh.sensors.signal_instrument import AbstractSignalInstrument
 
 
 class Alignment(eqx.Module):
-    """How a box is turned on the body: by `yaw` about z, then `pitch` about y, then `roll` about x, rad."""
+    """The orientation of a box on the body: turned by `yaw` about z, then `pitch` about y, then `roll` about x, rad."""
 
     roll: jax.Array = parameter("rad", scale=0.01, default=0.0)
     pitch: jax.Array = parameter("rad", scale=0.01, default=0.0)
@@ -32,18 +32,18 @@ class Alignment(eqx.Module):
 class IMU(AbstractSignalInstrument):
     """An inertial measurement unit that rolls, pitches and turns with the body.
 
-    - `signals`: the channels and their errors, a mapping to `Signal`, out of `a_x`, `a_y`, `a_z` (m/s^2, specific
-      force) and `roll_rate`, `pitch_rate`, `yaw_rate` (rad/s, about the box's own axes); names alone have no errors.
-    - `position`: of the box from the centre of gravity, in the body's axes. It feels the whole rigid body's
-      `f + alpha x r + omega x (omega x r)`, and gravity through roll and pitch.
-    - `alignment`: how the box is turned on the body; exact rotations.
-    - `low_pass`: a `LowPass` in every channel, before the errors (it does not see what is between samples).
+    - `signals`: a mapping from channels to their errors (`Signal`). The channels are `a_x`, `a_y`, `a_z` (m/s^2, specific force)
+      and `roll_rate`, `pitch_rate`, `yaw_rate` (rad/s, about the box's own axes). Channels given as names only have no errors.
+    - `position`: position of the box from the centre of gravity, in the body's axes. It measures the specific force of
+      the rigid body, `f + alpha x r + omega x (omega x r)`, which includes gravity through roll and pitch.
+    - `alignment`: the orientation of the box on the body, as exact rotations.
+    - `low_pass`: a `LowPass` in every channel, before the errors (it has only the samples, not the values between them).
 
-    Cars without roll, pitch and their rates have zero of them; without `a_z` it is the gravity normal to the road.
-    Roads are quasi-static, for devices as for cars: grade and bank tilt gravity, but gyroscopes do not say that the road
-    itself turns along the way (at 25 m/s on a bank of 0.05 rad over 50 m up to 0.047 rad/s), nor accelerometers its curvature.
+    For cars without roll, pitch and their rates these are zero; without `a_z` it is the gravity normal to the road. Roads are
+    quasi-static, for devices and for cars: grade and bank tilt gravity, but gyroscopes do not measure the rotation of the road
+    surface along the way (at 25 m/s on a bank of 0.05 rad over 50 m up to 0.047 rad/s), nor accelerometers its curvature.
 
-    **Raises** `InputError` for unknown channels, or anything that is not what it should be.
+    **Raises** `InputError` for unknown channels, numbers out of range, or fields of another type.
     """
 
     known: ClassVar[dict[str, str]] = {
@@ -64,12 +64,12 @@ class IMU(AbstractSignalInstrument):
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Specific force in the road's plane, and how the car turns."""
+        """Specific force in the road's plane, yaw rate and yaw acceleration."""
         return ("a_x", "a_y", "yaw_rate", "yaw_acceleration")
 
     @property
     def may_use(self) -> tuple[str, ...]:
-        """How the body stands on the road, and the road in space."""
+        """Roll and pitch of the body with their rates and accelerations, vertical specific force, grade and bank."""
         return (*POSES, "roll_acceleration", "pitch_acceleration", "a_z", "grade", "bank")
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:

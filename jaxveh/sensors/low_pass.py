@@ -1,4 +1,4 @@
-"""The low-pass in a sensor: as an ordinary differential equation that a model can contain, and applied to channels."""
+"""The low-pass of a sensor: as an ordinary differential equation in a model, and applied to channels."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _DAMPING = math.sqrt(0.5)
 
 
 class LowPass(eqx.Module):
-    """A Butterworth low-pass of order 1 or 2 with unit gain at rest: -3 dB at `cutoff_hz` (Hz).
+    """A Butterworth low-pass of order 1 or 2 with unit gain at frequency zero: -3 dB at `cutoff_hz` (Hz).
 
     Order 2 (default): `y'' + sqrt(2) w y' + w^2 y = w^2 u` with `w = 2 pi cutoff`; order 1: `y' + w y = w u`. At low
-    frequencies it delays by `delay` seconds. S. Butterworth, On the theory of filter amplifiers (1930).
+    frequencies its delay is `delay` (s). S. Butterworth, On the theory of filter amplifiers (1930).
     """
 
     cutoff_hz: jax.Array = positive("Hz", default=20.0)
@@ -35,12 +35,12 @@ class LowPass(eqx.Module):
 
     @property
     def omega(self) -> jax.Array:
-        """Cutoff in rad/s."""
+        """The cutoff frequency, rad/s."""
         return (2 * math.pi) * self.cutoff_hz
 
     @property
     def delay(self) -> jax.Array:
-        """Group delay at low frequencies, s: `2 zeta / w` (order 2) or `1 / w`."""
+        """The group delay at low frequencies, s: `2 zeta / w` (order 2) or `1 / w`."""
         return (2 * _DAMPING if self.order == 2 else 1.0) / self.omega
 
     def state_names(self, channel: str) -> tuple[str, ...]:
@@ -48,7 +48,7 @@ class LowPass(eqx.Module):
         return (f"{channel}_filtered", f"{channel}_filtered_rate")[: self.order]
 
     def start(self, u: Any) -> tuple:
-        """The states that have settled at a constant input."""
+        """The settled states for a constant input u."""
         return (u, jnp.zeros_like(u))[: self.order]
 
     def derivatives(self, state: tuple, u: Any) -> tuple:
@@ -60,9 +60,10 @@ class LowPass(eqx.Module):
         return rate, w * (w * (u - value) - 2 * _DAMPING * rate)
 
     def step(self, state: tuple, u0: Any, u1: Any, dt: Any) -> tuple:
-        """The states after `dt` seconds in which the input runs linearly from u0 to u1: exact for any step."""
+        """The states after `dt` seconds in which the input changes linearly from u0 to u1: exact for any step."""
         w, ramp, lag = self.omega, (u1 - u0) / dt, self.delay
-        # Along a ramp the filter settles to the ramp, later by its delay; what is left of the start decays freely.
+        # For a ramp the filter settles to the ramp, later by its delay; the difference of the initial state from it
+        # decays freely.
         if self.order == 1:
             return (u1 - ramp * lag + (state[0] - (u0 - ramp * lag)) * jnp.exp(-w * dt),)
         value, rate = state[0] - (u0 - ramp * lag), state[1] - ramp
@@ -75,12 +76,11 @@ class LowPass(eqx.Module):
 
 
 def low_pass(recording: Recording, channels, cutoff_hz: float = 20.0, order: int = 2) -> Recording:
-    """The recording with the causal low-pass of a sensor applied to other channels, so that all are equally late.
+    """The recording with the causal low-pass of a sensor applied to other channels, so that all have the same delay.
 
-    A recording whose gyroscope and accelerometers are low-passed but whose inputs are not is put right by passing the
-    inputs through the same filter. The channel is taken to be linear between rows (steps may be irregular) and to
-    have been constant before the first; the filter's equation is solved exactly. Differentiable in the channels'
-    values.
+    In a recording whose gyroscope and accelerometers are low-passed but whose inputs are not, pass the inputs through
+    the same filter. A channel is taken to be linear between rows (steps may be irregular) and constant before the first
+    row; the filter's equation is solved exactly. It is differentiable with respect to the channels' values.
 
     **Raises** `InputError` for an unknown channel, one that is not finite throughout, a cutoff that is not positive
     or an order other than 1 and 2.
@@ -98,7 +98,7 @@ def low_pass(recording: Recording, channels, cutoff_hz: float = 20.0, order: int
             first = int(np.argmin(np.isfinite(np.asarray(values))))
             raise InputError(
                 f"low_pass: {name} = {float(values[first])} at t = {recording.time[first]} s: must be finite throughout, "
-                f'a filter remembers. Fill it first: recording.fill("{name}", "linear").'
+                f'as a low-pass needs every row. Fill it first: recording.fill("{name}", "linear").'
             )
         device = LowPass(jnp.asarray(cutoff_hz, values.dtype), order)
         filtered[name] = filtered_rows(device, values, jnp.asarray(steps, values.dtype))
@@ -107,7 +107,8 @@ def low_pass(recording: Recording, channels, cutoff_hz: float = 20.0, order: int
 
 @eqx.filter_jit
 def filtered_rows(device: LowPass, values: jax.Array, steps: jax.Array) -> jax.Array:
-    """The low-pass of rows `values` (T, ...), `steps` (T - 1,) seconds apart, settled at the first of them."""
+    """The low-passed rows of `values` (T, ...), with `steps` (T - 1,) between them (s); the filter starts settled at
+    the first row."""
 
     def body(state, row):
         state = device.step(state, *row)

@@ -1,4 +1,4 @@
-"""What can be in a car, by name."""
+"""Sets of sensors and devices by name."""
 
 from __future__ import annotations
 
@@ -14,7 +14,11 @@ from jaxveh.vehicles import kit
 
 
 class NamedDevices(NamedTuple):
-    """How to make what is in the car, and what to say about it; `takes_noise`: standard deviations by channel may be given."""
+    """A named set of sensors or devices.
+
+    `make`: the function that makes them for a car; `help`: one line about them; `takes_noise`: whether standard
+    deviations by channel may be given.
+    """
 
     make: Callable[[Any, Mapping[str, Any]], SensorSet | Suite | None]
     help: str
@@ -22,7 +26,7 @@ class NamedDevices(NamedTuple):
 
 
 DEVICES: dict[str, NamedDevices] = {
-    "none": NamedDevices(lambda car, noise: None, "nothing but the truth"),
+    "none": NamedDevices(lambda car, noise: None, "no sensors, only the true quantities"),
     "esc": NamedDevices(
         lambda car, noise: SensorSet(Gaussian(dict(noise))) if noise else esc(),
         "yaw rate and lateral acceleration in every row, with white noise",
@@ -30,27 +34,27 @@ DEVICES: dict[str, NamedDevices] = {
     ),
     "production": NamedDevices(
         lambda car, noise: production_car(_radius(car)),
-        "inertial unit, steering angle, wheel speeds, satellite navigation of a series car: rates, delays, steps, offsets",
+        "inertial unit, steering angle, wheel speeds and satellite navigation of a series car, with rates, delays and errors",
     ),
     "proving-ground": NamedDevices(
         lambda car, noise: proving_ground_car(_radius(car)),
-        "precise inertial unit of six axes, optical sensor, steering angle, wheel speeds, satellite navigation with position",
+        "precise six-axis inertial unit, optical sensor, steering angle, wheel speeds, satellite navigation with position",
     ),
 }
 """Sets of sensors and of devices by name, for programs."""
 
 
 def named_devices(name: str, car: Any, noise: Mapping[str, Any] | None = None) -> SensorSet | Suite | None:
-    """The sensors or devices of a name in `DEVICES`, for `car`.
+    """The sensors or devices of this name in `DEVICES`, for `car`.
 
-    `noise`: standard deviations by channel, in the channels' units, for those that take them (default: the usual ones; other
-    channels of the car may be named, too). **Raises** `InputError` for a name that is not there.
+    `noise`: standard deviations by channel, in the channels' units, for sets that take them (default: typical values;
+    other channels of the car may be named, too). **Raises** `InputError` for an unknown name.
     """
     check_one_of("devices", name, DEVICES)
     return DEVICES[name].make(car, noise or {})
 
 
 def _radius(car: Any) -> float | None:
-    """The radius of wheels that spin, m; None for a car without, which has no wheel speeds to measure."""
+    """The radius of the wheels, m; None for a car whose wheels have no spin, which has no wheel speeds to measure."""
     spins = set(kit.wheel_names("omega")) <= set(car.state_type._fields)
     return float(car.wheel_radius) if spins else None

@@ -1,4 +1,4 @@
-"""The optical sensor of test cars, which sees the road pass below it."""
+"""The optical sensor of test cars, which measures its velocity over the road."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from jaxveh.sensors.signal_instrument import AbstractSignalInstrument
 
 
 class OpticalSideslip(AbstractSignalInstrument):
-    """A correlation sensor: the velocity of its own place over the road, not of the centre of gravity.
+    """A correlation sensor: it measures the velocity over the road of its own position, not of the centre of gravity.
 
-    - `signals`: the channels and their errors, a mapping to `Signal`, out of `v_x`, `v_y` (m/s) and `sideslip` (rad,
-      `atan2(v_y, v_x)`); names alone have no errors.
-    - `position`: of the sensor from the centre of gravity.
-    - `lowest` (m/s): below this true speed it says nothing, NaN.
+    - `signals`: a mapping from channels to their errors (`Signal`). The channels are `v_x`, `v_y` (m/s) and `sideslip`
+      (rad, `atan2(v_y, v_x)`). Channels given as names only have no errors.
+    - `position`: position of the sensor from the centre of gravity.
+    - `lowest` (m/s): below this true speed all channels are NaN.
 
     **Raises** `InputError` for unknown channels or numbers out of range.
     """
@@ -40,16 +40,16 @@ class OpticalSideslip(AbstractSignalInstrument):
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The velocity of the centre of gravity and how the car turns."""
+        """The velocity of the centre of gravity, and the yaw rate."""
         return ("v_x", "v_y", "yaw_rate")
 
     @property
     def may_use(self) -> tuple[str, ...]:
-        """How the body stands on the road."""
+        """Roll and pitch of the body and their rates."""
         return POSES
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
-        """Velocities and their angle."""
+        """The velocities and the sideslip at the sensor."""
         v_x, v_y = velocity(outputs, self.position)
         true = {"v_x": v_x, "v_y": v_y, "sideslip": numerics.arctan2(v_y, v_x)}
         said = self.sent_values(true, key)

@@ -1,4 +1,4 @@
-"""Random sequences of devices, drawn from one key: without a key (None) there is no randomness and all are zero."""
+"""Random sequences of devices, drawn from one key; without a key (None) all of them are zero."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from jaxveh import numerics
 
 
 def subkey(key: Any, tag: int | str) -> Any:
-    """A key of its own for each tag, a number or a name; None stays None.
+    """A separate key for each tag, a number or a name; None stays None.
 
-    A name counts by its CRC-32, which is the same everywhere and always.
+    A name is used by its CRC-32, which is the same on every machine and in every run.
     """
     number = zlib.crc32(tag.encode()) if isinstance(tag, str) else tag
     return None if key is None else jax.random.fold_in(key, number)
@@ -33,10 +33,10 @@ def walk(key: Any, n: int, rate: jax.Array, period: float, dtype: Any) -> jax.Ar
 
 
 def gauss_markov(key: Any, n: int, rate: jax.Array, time: jax.Array, period: float, dtype: Any) -> jax.Array:
-    """A first-order Gauss-Markov process from 0, driven like the walk and forgetting in `time` s.
+    """A first-order Gauss-Markov process from 0, driven like the random walk, with the correlation time `time` (s).
 
-    Its variance is `rate^2 time / 2 (1 - exp(-2 t / time))`: the walk's at first, then constant (Brown & Hwang,
-    Introduction to Random Signals and Applied Kalman Filtering, 4th ed., section 4.2). The steps are exact.
+    Its variance is `rate^2 time / 2 (1 - exp(-2 t / time))`: that of the random walk at first, then constant (Brown &
+    Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th ed., section 4.2). The steps are exact.
     """
     kept = jnp.exp(-period / time)
     spread = rate * numerics.sqrt(-0.5 * time * jnp.expm1(-2 * period / time))
@@ -51,10 +51,11 @@ def gauss_markov(key: Any, n: int, rate: jax.Array, time: jax.Array, period: flo
 
 
 def on_and_off(key: Any, n: int, start_rate: jax.Array, mean_length: jax.Array, period: float) -> jax.Array:
-    """Whether each of `n` instants lies in a random outage: they begin at `start_rate` (1/s), last `mean_length` s.
+    """Whether each of `n` instants lies in a random outage; outages begin at `start_rate` (1/s) and last `mean_length`
+    (s) on average.
 
-    A chain of two states (Gilbert, Capacity of a burst-noise channel, 1960) that begins outside, with the
-    probabilities of a process in continuous time over one period.
+    It is a Markov chain of two states (Gilbert, Capacity of a burst-noise channel, 1960) that begins without an outage,
+    with the transition probabilities of the process in continuous time over one period.
     """
     if key is None:
         return jnp.zeros(n, bool)

@@ -1,7 +1,7 @@
-"""What a point of the car's body feels: angular rates, specific force and velocity away from the centre of gravity.
+"""Motion of a point of the car's body: angular rates, specific force and velocity away from the centre of gravity.
 
-Vectors are tuples (x, y, z). The intermediate axes (road-parallel) become the body's by a turn of `pitch` about y, then
-of `roll` about x (ISO 8855): roll positive with the left side up, pitch positive with the nose down.
+Vectors are tuples (x, y, z). The intermediate axes (road-parallel), turned by `pitch` about y and then by `roll` about
+x, are the body's axes (ISO 8855): roll positive with the left side up, pitch positive with the nose down.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from jaxveh.vehicles import GRAVITY
 Vector = tuple[Any, Any, Any]
 
 POSES = ("roll", "pitch", "roll_rate", "pitch_rate")
-"""The outputs that say how the body stands on the road; zero where a car does not have them."""
+"""The outputs for roll and pitch of the body; taken as zero if a car does not have them."""
 
 
 INERTIAL = ("a_x", "a_y", "a_z", "roll_rate", "pitch_rate", "yaw_rate")
-"""What accelerometers and gyroscopes say, in this order."""
+"""The channels of accelerometers and gyroscopes, in this order."""
 
 
 def into_axes(v: Vector, roll: Any, pitch: Any, yaw: Any = None) -> Vector:
-    """The vector in axes that are turned by yaw about z, then pitch about y, then roll about x."""
+    """The vector in axes turned by yaw about z, then pitch about y, then roll about x."""
     x, y, z = v
     if yaw is not None:
         c, s = numerics.cos(yaw), numerics.sin(yaw)
@@ -38,7 +38,7 @@ def into_axes(v: Vector, roll: Any, pitch: Any, yaw: Any = None) -> Vector:
 
 
 def out_of_axes(v: Vector, roll: Any, pitch: Any) -> Vector:
-    """The way back: a vector of the turned axes in those before the turns of pitch and roll."""
+    """The inverse of `into_axes` for pitch and roll: a vector of the turned axes in the axes before the turns."""
     x, y, z = v
     c, s = numerics.cos(roll), numerics.sin(roll)
     y, z = c * y - s * z, c * z + s * y
@@ -58,7 +58,7 @@ def add(*vectors: Vector) -> Vector:
 
 
 def of_angles(roll, pitch, roll_rate, pitch_rate, yaw_rate) -> Vector:
-    """The body's angular velocity in its own axes, of the rates of yaw, pitch and roll."""
+    """The body's angular velocity in its own axes, from the rates of yaw, pitch and roll."""
     zero = jnp.zeros_like(yaw_rate)
     _, about_y, about_z = into_axes((zero, pitch_rate, zero), roll, zero)
     turn = into_axes((zero, zero, yaw_rate), roll, pitch)
@@ -66,7 +66,7 @@ def of_angles(roll, pitch, roll_rate, pitch_rate, yaw_rate) -> Vector:
 
 
 def rotation(outputs: Mapping[str, jax.Array]) -> tuple[Vector, Vector]:
-    """The body's angular velocity and acceleration in its own axes; the second is the first's exact derivative."""
+    """The body's angular velocity and acceleration in its own axes; the acceleration is the exact derivative of the velocity."""
     at = lambda name: outputs.get(name, jnp.zeros_like(outputs["yaw_rate"]))
     values = (*(at(name) for name in POSES), outputs["yaw_rate"])
     rates = (at("roll_rate"), at("pitch_rate"), at("roll_acceleration"), at("pitch_acceleration"))
@@ -74,9 +74,9 @@ def rotation(outputs: Mapping[str, jax.Array]) -> tuple[Vector, Vector]:
 
 
 def specific_force(outputs: Mapping[str, jax.Array], position: Any, rates: Vector, accelerations: Vector) -> Vector:
-    """What an ideal accelerometer at `position` (m from the centre of gravity, body axes) shows in the body's axes.
+    """The specific force (m/s^2) in the body's axes at `position` (m from the centre of gravity, body axes).
 
-    `f + alpha x r + omega x (omega x r)`. A car without `a_z` presses on its road with the gravity normal to it.
+    It is `f + alpha x r + omega x (omega x r)`. For a car without `a_z`, this is the gravity normal to the road.
     """
     roll, pitch = (outputs.get(name, jnp.zeros_like(outputs["a_x"])) for name in POSES[:2])
     force = outputs["a_x"], outputs["a_y"], outputs["a_z"] if "a_z" in outputs else _normal_gravity(outputs)
@@ -85,7 +85,8 @@ def specific_force(outputs: Mapping[str, jax.Array], position: Any, rates: Vecto
 
 
 def inertial(outputs: Mapping[str, jax.Array], position: Any) -> dict[str, jax.Array]:
-    """What ideal accelerometers (m/s^2) and gyroscopes (rad/s) at `position` on the body say, by channel (`INERTIAL`)."""
+    """The measurements of ideal accelerometers (m/s^2) and gyroscopes (rad/s) at `position` on the body, by channel
+    (`INERTIAL`)."""
     rates, accelerations = rotation(outputs)
     force = specific_force(outputs, position, rates, accelerations)
     return dict(zip(INERTIAL, (*force, *rates), strict=True))
@@ -104,12 +105,13 @@ def rise(outputs: Mapping[str, jax.Array]) -> jax.Array:
     """The vertical speed of a car that follows its road, m/s, positive upwards."""
     along, across = (numerics.tan(outputs.get(name, jnp.zeros_like(outputs["v_x"]))) for name in ("grade", "bank"))
     run = numerics.sqrt(1.0 + along * along)
-    # As gravity lies in the road's plane: x in the vertical plane of the car's heading, y completes it.
+    # The axes in the road's plane are those of gravity's components: x in the vertical plane of the car's heading, y
+    # perpendicular to it.
     return (outputs["v_x"] * along + outputs["v_y"] * across / numerics.sqrt(run * run + across * across)) / run
 
 
 def _normal_gravity(outputs: Mapping[str, jax.Array]) -> jax.Array:
-    """Gravity's part normal to a road whose slopes are tan(grade) and tan(bank), positive."""
+    """The component of gravity normal to a road with the slopes tan(grade) and tan(bank), positive."""
     zero = jnp.zeros_like(outputs["a_x"])
     along, across = (numerics.tan(outputs.get(name, zero)) for name in ("grade", "bank"))
     return GRAVITY / numerics.sqrt(1 + along * along + across * across)

@@ -1,4 +1,4 @@
-"""Sets of sensors: which channels, how noisy, where mounted, low-passed or not."""
+"""Sets of sensors: their channels, noise, mounting position and low-pass."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from jaxveh.statespace import Gaussian
 
 
 class Position(eqx.Module):
-    """Where a device sits, from the centre of gravity: `x` forward, `y` left, `z` up, in m, in the body's axes.
+    """The position of a device from the centre of gravity: `x` forward, `y` left, `z` up, in m, in the body's axes.
 
-    The height counts only for vehicles that roll or pitch.
+    The height has an effect only for vehicles that roll or pitch.
     """
 
     x: jax.Array = parameter("m", scale=0.5, default=0.0)
@@ -32,14 +32,14 @@ class Position(eqx.Module):
 
 
 class SensorSet(eqx.Module):
-    """Sensors that speak together: the channels that `noise` names, each a vehicle output.
+    """Sensors with common sample times: the channels that `noise` names, each a vehicle output.
 
-    - `noise`: standard deviations by channel name, white, of the recorded values (after the low-pass). It is one law,
-      drawn at once: with another channel the draws of all are others (not so with the devices of a `Suite`).
-    - `position`: of the accelerometers. On a rigid body that turns in the plane, a sensor at (x, y) feels
-      `a_x - yaw_acceleration y - yaw_rate^2 x` and `a_y + yaw_acceleration x - yaw_rate^2 y`. In a car that rolls or
-      pitches, accelerometers and gyroscopes lean with the body and feel what an ideal `IMU` there does: gravity through
-      roll and pitch, and its height. Speeds are those of the centre of gravity, as loggers convert them.
+    - `noise`: standard deviations by channel name, white, of the recorded values (after the low-pass). All channels are
+      drawn at once: an additional channel changes the draws of all others (unlike the devices of a `Suite`).
+    - `position`: position of the accelerometers. On a rigid body that turns in the plane, a sensor at (x, y) measures
+      `a_x - yaw_acceleration y - yaw_rate^2 x` and `a_y + yaw_acceleration x - yaw_rate^2 y`. In a car that rolls or pitches,
+      accelerometers and gyroscopes turn with the body and measure the same as an ideal `IMU` there, with gravity through roll
+      and pitch and the effect of the height. Speeds are those of the centre of gravity, to which loggers convert them.
     - `low_pass`: a `LowPass` in every channel, or None.
     """
 
@@ -55,27 +55,27 @@ class SensorSet(eqx.Module):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The measured channels' names."""
+        """The names of the measured channels."""
         return self.noise.names
 
     @property
     def filter_names(self) -> tuple[str, ...]:
-        """The names of the low-pass' states, none without one."""
+        """The names of the states of the low-pass; empty without one."""
         if self.low_pass is None:
             return ()
         return tuple(name for channel in self.channels for name in self.low_pass.state_names(channel))
 
     @property
     def filter_type(self) -> Any:
-        """The NamedTuple class of the low-pass' states."""
+        """The NamedTuple class of the states of the low-pass."""
         return record_type("FilterState", self.filter_names)
 
     def feel(self, outputs: Any) -> Any:
-        """What reaches the sensors: a NamedTuple by channel, before low-pass and noise.
+        """The quantities at the sensors: a NamedTuple by channel, before low-pass and noise.
 
-        `outputs` has the channels' names as attributes; yaw_rate and yaw_acceleration count where accelerations are measured,
-        as zero where a car (`Longitudinal`, `Kinematic`) does not say them. Of a car that leans a_x, a_y, yaw_rate and
-        yaw_acceleration are needed wherever one of `rigid_body.INERTIAL` is measured.
+        `outputs` has the channels' names as attributes. If accelerations are measured, yaw_rate and yaw_acceleration
+        are used, too; they are zero if a car (`Longitudinal`, `Kinematic`) does not have them. For a car with roll or
+        pitch, a_x, a_y, yaw_rate and yaw_acceleration are needed if one of `rigid_body.INERTIAL` is measured.
         """
         check_names("sensors measure a channel the vehicle does not have", self.channels, outputs._fields)
         leans = {"roll", "pitch"} & set(outputs._fields) and set(INERTIAL) & set(self.channels)
@@ -84,12 +84,12 @@ class SensorSet(eqx.Module):
         return record_type("Measurements", self.channels)(*values)
 
     def start(self, outputs: Any) -> Any:
-        """Low-pass states that have settled at these outputs."""
+        """The states of the low-pass, settled at these outputs."""
         settled = [self.low_pass.start(value) for value in self.feel(outputs)] if self.low_pass else []
         return self.filter_type(*[state for states in settled for state in states])
 
     def derivatives(self, filter_state: Any, outputs: Any) -> Any:
-        """Time derivatives of the low-pass states, the same NamedTuple."""
+        """The time derivatives of the states of the low-pass, as the same NamedTuple."""
         if self.low_pass is None:
             return self.filter_type()
         felt, n = self.feel(outputs), self.low_pass.order
@@ -97,18 +97,18 @@ class SensorSet(eqx.Module):
         return self.filter_type(*[rate for of_channel in rates for rate in of_channel])
 
     def measure(self, outputs: Any, filter_state: Any = None) -> Any:
-        """What the sensors say without noise: a NamedTuple by channel."""
+        """The measurements without noise: a NamedTuple by channel."""
         if self.low_pass is None:
             return self.feel(outputs)
         if filter_state is None:
-            raise InputError("SensorSet.measure: these sensors have a low-pass; give its states (filter_state).")
+            raise InputError("SensorSet.measure: these sensors have a low-pass; give its states as filter_state.")
         return record_type("Measurements", self.channels)(*filter_state[:: self.low_pass.order])
 
     def _at_position(self, channel: str, outputs: Any):
         value = getattr(outputs, channel)
         if channel not in ("a_x", "a_y"):
             return value
-        # A car without these goes straight, or turns as steadily as its inputs are held.
+        # A car without these goes straight, or turns steadily while its inputs are held.
         zero = jnp.zeros_like(value)
         turns, gains = getattr(outputs, "yaw_rate", zero) ** 2, getattr(outputs, "yaw_acceleration", zero)
         if channel == "a_x":
@@ -126,13 +126,13 @@ def esc(
     low_pass: LowPass | None = None,
     position: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> SensorSet:
-    """The sensors of a stability control: yaw rate and lateral acceleration, and more where asked for.
+    """The sensors of a stability control: yaw rate and lateral acceleration, and further channels if given.
 
-    Each channel has its noise's standard deviation (rad/s, m/s^2, m/s), or None: not fitted. `low_pass`: in every
-    channel, such as `LowPass(20.0)`. `position`: of the accelerometers from the centre of gravity (x, y, z), m. In a car
-    that rolls or pitches they lean with its body, and feel gravity.
+    Each argument is the standard deviation of a channel's noise (rad/s, m/s^2, m/s), or None if the sensor is not fitted.
+    `low_pass`: the low-pass in every channel, such as `LowPass(20.0)`. `position`: position of the accelerometers from the
+    centre of gravity (x, y, z), m. In a car that rolls or pitches they turn with its body and measure gravity.
 
-    **Raises** `InputError` for a standard deviation that is not positive, or where nothing is fitted.
+    **Raises** `InputError` for a standard deviation that is not positive, or if no sensor is fitted.
     """
     fitted = {"yaw_rate": yaw_rate, "a_y": a_y, "a_x": a_x, "v_x": v_x, "v_y": v_y}
     fitted = {name: std for name, std in fitted.items() if std is not None}

@@ -18,17 +18,18 @@ _NOISE, _DRIFT = 0, 1
 
 
 class Signal(eqx.Module):
-    """What one channel makes of its true value: `(1 + scale) value + bias + drift + noise`, limited and rounded.
+    """The errors of one channel: it sends `(1 + scale) value + bias + drift + noise`, limited and rounded.
 
-    In the channel's unit unless said otherwise; an error that is absent is None. A gyroscope's or accelerometer's
-    model as in Groves, Principles of GNSS, Inertial and Multisensor Integrated Navigation Systems, 2nd ed., chapter 4.
+    Values are in the channel's unit unless stated otherwise; None means no such error. The model is that of a gyroscope or
+    accelerometer in Groves, Principles of GNSS, Inertial and Multisensor Integrated Navigation Systems, 2nd ed., chapter 4.
 
-    - `noise`: standard deviation of each sample, white. A density d (unit per root Hz) is `d sqrt(rate / 2)`.
-    - `bias`: constant. `scale`: relative error of the gain.
-    - `drift` (unit per root second): the bias walks from 0 at the first sample, with variance `drift^2 t`. With
-      `drift_time` (s) it is a Gauss-Markov process, whose standard deviation ends at `drift sqrt(drift_time / 2)`.
-    - `saturation`: the most the channel can say, of either sign. `quantisation`: its step; the most is then the largest
-      multiple within `saturation`. The derivative of a rounded number with respect to everything but the step is zero.
+    - `noise`: standard deviation of each sample, white. For a density d (unit per root Hz) it is `d sqrt(rate / 2)`.
+    - `bias`: a constant offset. `scale`: relative error of the gain.
+    - `drift` (unit per root second): a random walk from 0 at the first sample, with variance `drift^2 t`. With
+      `drift_time` (s) it is a Gauss-Markov process, whose standard deviation tends to `drift sqrt(drift_time / 2)`.
+    - `saturation`: the largest absolute value that the channel can send. `quantisation`: the step to which values are
+      rounded; the largest value is then the largest multiple within `saturation`. The derivative of a rounded number
+      with respect to everything but the step is zero.
 
     **Raises** `InputError` for a number out of range, or a `drift_time` without `drift`.
     """
@@ -44,10 +45,10 @@ class Signal(eqx.Module):
     def __check_init__(self):
         check_parameters(self)
         if self.drift_time is not None and self.drift is None:
-            raise InputError(f"Signal.drift_time = {self.drift_time}: needs drift, the rate at which the bias walks.")
+            raise InputError(f"Signal.drift_time = {self.drift_time}: needs drift, the rate of the random walk.")
 
     def apply(self, value: jax.Array, period: float, key: Any = None) -> jax.Array:
-        """What is sent of the true values (n,), `period` s apart; without a key nothing is random."""
+        """The values that are sent for true values (n,), `period` (s) apart; without a key there are no random errors."""
         said = (1 + self.scale) * value + self.bias
         if self.drift is not None:
             said = said + self._drift(subkey(key, _DRIFT), value.shape[0], period, value.dtype)
@@ -58,12 +59,13 @@ class Signal(eqx.Module):
         return self._limit(said, None)
 
     def _limit(self, said, step):
-        """Within the saturation, where there is one; of numbers of steps, within as many whole ones as are in it."""
+        """The values limited to the saturation, if there is one; with a `step`, numbers of steps limited to the whole
+        steps within it."""
         if self.saturation is None:
             return said
         most = self.saturation
         if step is not None:
-            # A ratio of decimal numbers that should be whole may lie just below.
+            # By rounding, a ratio that should be a whole number may lie just below it.
             most = jnp.floor(self.saturation / step * (1 + 4 * jnp.finfo(said.dtype).eps))
         return jnp.clip(said, -most, most)
 
@@ -74,7 +76,7 @@ class Signal(eqx.Module):
 
 
 def as_signals(signals) -> dict[str, Signal]:
-    """A mapping from channel to `Signal`, or names alone, whose channels then have no errors."""
+    """A mapping from channel to `Signal`, made from such a mapping or from names, whose channels then have no errors."""
     if isinstance(signals, str):
         signals = (signals,)
     if isinstance(signals, Mapping):
@@ -85,7 +87,7 @@ def as_signals(signals) -> dict[str, Signal]:
 
 
 def check_signals(name: str, signals: Mapping[str, Signal], allowed: Iterable[str]) -> None:
-    """Raise unless there is a channel, all are among `allowed`, and each has a `Signal`."""
+    """Raise `InputError` unless there is a channel, all channels are `allowed`, and each has a `Signal`."""
     if not signals:
         raise InputError(f"{name} is empty: name at least one channel; there are: {', '.join(allowed)}.")
     check_names(name, signals, allowed)
@@ -95,7 +97,7 @@ def check_signals(name: str, signals: Mapping[str, Signal], allowed: Iterable[st
 
 
 def apply_all(signals: Mapping[str, Signal], order: Iterable[str], values: Mapping, period: float, key: Any) -> dict:
-    """What is sent of the true values by channel, in this order; the key's part of a channel is by its name."""
+    """The values that are sent for the true values, by channel, in this order; each channel has a key by its name."""
     return {
         channel: signals[channel].apply(values[channel], period, subkey(key, channel))
         for channel in order

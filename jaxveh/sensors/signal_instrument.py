@@ -1,4 +1,4 @@
-"""Devices that send some of the channels that they know, each with errors of its own."""
+"""Devices that send some of their known channels, each with its own errors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from jaxveh.sensors.signal import Signal, apply_all, as_signals, check_signals
 
 
 class AbstractSignalInstrument(AbstractInstrument):
-    """A device that sends the channels of `signals`, which maps them to their errors, out of those that its kind knows.
+    """A device that sends the channels of `signals`, a mapping to their errors, from the `known` channels of its class.
 
     **Raises** `InputError` for unknown channels or numbers out of range.
     """
@@ -29,14 +29,14 @@ class AbstractSignalInstrument(AbstractInstrument):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The measured channels, in the order in which the device's kind knows them."""
+        """The measured channels, in the order of `known`."""
         return tuple(name for name in self.known if name in self.signals)
 
     @property
     def units(self) -> dict[str, str]:
-        """Of the measured channels."""
+        """The units of the measured channels."""
         return {name: self.known[name] for name in self.channels}
 
     def sent_values(self, true: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
-        """What is sent of the true values by channel, (n,) each."""
+        """The values that are sent for the true values, by channel, (n,) each."""
         return apply_all(self.signals, self.known, true, self.period, key)

@@ -1,4 +1,4 @@
-"""Spans of time in which something holds: `((start, end), ...)` in s, the start included and the end not."""
+"""Spans of time, `((start, end), ...)` in s, including the start but not the end."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
 
-_LATE = 1e-9  # stamps that should be equal may differ by rounding
+_LATE = 1e-9  # s: time stamps that should be equal may differ by rounding
 
 
 def as_spans(spans) -> tuple[tuple[float, float], ...]:
-    """Spans as a static tuple of pairs of floats; one pair alone is one span."""
+    """Spans as a static tuple of pairs of floats; a single pair is one span."""
     spans = tuple(spans)
     if len(spans) == 2 and not any(hasattr(end, "__len__") for end in spans):
         spans = (spans,)
@@ -22,7 +22,7 @@ def as_spans(spans) -> tuple[tuple[float, float], ...]:
 
 
 def check_spans(name: str, spans) -> None:
-    """Raise unless every span is a pair with a finite start before its end."""
+    """Raise `InputError` unless every span is a pair with a finite start before its end."""
     for span in spans:
         if len(span) != 2 or not (math.isfinite(span[0]) and span[0] < span[1]):
             raise InputError(f"{name} = {span}: must be pairs (start, end) in s, with start before end.")

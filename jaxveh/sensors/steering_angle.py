@@ -1,4 +1,4 @@
-"""The steering angle sensor: offset, backlash, steps of its code disc."""
+"""The steering angle sensor, with offset, backlash and the steps of its code disc."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from jaxveh.sensors.signal import Signal
 class SteeringAngle(AbstractInstrument):
     """A sensor of the steering angle, positive to the left.
 
-    - `channel`: what it says, `steer` (rad at the road wheels) or `steering_wheel` (rad).
-    - `ratio`: steering wheel over road wheel, where the steering wheel's angle is to be made of `steer`; without one
-      the car must have the output `steering_wheel`.
-    - `backlash` (rad of the channel): the width of the play between the shaft and the sensor; the play operator
+    - `channel`: the channel that it sends, `steer` (rad at the road wheels) or `steering_wheel` (rad).
+    - `ratio`: the angle of the steering wheel over that of the road wheels, to compute `steering_wheel` from `steer`;
+      without it the car must have the output `steering_wheel`.
+    - `backlash` (rad of the channel): the width of the play between the shaft and the sensor. It is the play operator
       (Visintin, Differential Models of Hysteresis, 1994, section III.2), which starts in the middle.
     - `signal`: offset (`bias`), noise, steps (`quantisation`), in rad of the channel.
 
-    **Raises** `InputError` for numbers out of range, an unknown channel, a ratio with `steer`.
+    **Raises** `InputError` for numbers out of range, an unknown channel, or a ratio with the channel `steer`.
     """
 
     signal: Signal = eqx.field(default_factory=Signal)
@@ -43,22 +43,22 @@ class SteeringAngle(AbstractInstrument):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The one channel."""
+        """The channel."""
         return (self.channel,)
 
     @property
     def units(self) -> dict[str, str]:
-        """rad."""
+        """The unit, rad."""
         return {self.channel: "rad"}
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The channel's angle, or that of the road wheels where a ratio is given."""
+        """The channel's angle, or that of the road wheels if a ratio is given."""
         return ("steer",) if self.ratio is not None else (self.channel,)
 
     @property
     def may_use(self) -> tuple[str, ...]:
-        """Nothing else."""
+        """No further outputs."""
         return ()
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
@@ -72,10 +72,10 @@ class SteeringAngle(AbstractInstrument):
 
 
 def play(angle: jax.Array, width: jax.Array) -> jax.Array:
-    """What follows `angle` (n,) through a play of `width`: it moves only when pushed by one side or the other."""
+    """The angle that follows `angle` (n,) through a play of `width`: it moves only when one side of the play pushes it."""
 
     def body(follower, pusher):
-        # The middle is where it was or where a side has pushed it: a derivative has no tie to split.
+        # The follower stays or is pushed by one side, chosen by `where`: unlike a clip, no derivative is shared at a tie.
         low, high = pusher - 0.5 * width, pusher + 0.5 * width
         follower = jnp.where(follower < low, low, jnp.where(follower > high, high, follower))
         return follower, follower

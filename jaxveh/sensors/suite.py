@@ -1,4 +1,4 @@
-"""All the devices of a car: when to look at the car, and one table of what was said."""
+"""All devices of a car: the instants at which its outputs are needed, and one table of all samples."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from jaxveh.sensors.wrapper import innermost
 _NAME = "jaxveh.sensors.Suite"
 
 _SAME = 1e-9
-"""Instants closer than this, in s, are one."""
+"""Instants that are closer than this (s) are the same instant."""
 
 
 class Measured(NamedTuple):
-    """`times` (T,) in s, `channels` by name, (T,) each, NaN where a device did not speak, and their `units`."""
+    """`times` (T,) in s, `channels` by name, (T,) each, NaN where a device sent no sample, and their `units`."""
 
     times: np.ndarray
     channels: dict[str, jax.Array]
@@ -34,9 +34,9 @@ class Measured(NamedTuple):
 class Suite(eqx.Module):
     """The devices of one car, each with its own rate, delay and errors.
 
-    Simulate the car and save its outputs at `look_times`; `record` says what the devices make of them.
+    Simulate the car and save its outputs at `look_times`; `record` computes the devices' samples from them.
 
-    **Raises** `InputError` where there is no device, or two say a channel of one name.
+    **Raises** `InputError` if there is no device, or two devices have a channel of the same name.
     """
 
     devices: tuple[AbstractDevice, ...] = eqx.field(converter=lambda devices: _as_tuple(devices))
@@ -51,14 +51,14 @@ class Suite(eqx.Module):
             for channel in device.channels:
                 if channel in said:
                     raise InputError(
-                        f"Suite: {said[channel]} and {name_of(device)} both say {channel}: every channel needs a name of "
+                        f"Suite: {said[channel]} and {name_of(device)} both have {channel}: every channel needs a name of "
                         f'its own. Rename one: Renamed({name_of(device)}(...), {{"{channel}": "second_{channel}"}}).'
                     )
                 said[channel] = name_of(device)
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The names of all that is said, device after device."""
+        """The names of all channels, device after device."""
         return tuple(channel for device in self.devices for channel in device.channels)
 
     @property
@@ -68,42 +68,44 @@ class Suite(eqx.Module):
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The vehicle outputs that some device cannot do without."""
+        """The vehicle outputs that at least one device requires."""
         return tuple(dict.fromkeys(name for device in self.devices for name in device.needs))
 
     @property
     def may_use(self) -> tuple[str, ...]:
-        """The vehicle outputs that devices look at where there are any."""
+        """Further vehicle outputs that devices use if the car has them."""
         wanted = dict.fromkeys(name for device in self.devices for name in device.may_use)
         return tuple(name for name in wanted if name not in self.needs)
 
     def sample_times(self, duration: float) -> np.ndarray:
-        """The instants in [0, duration] at which some device speaks, s; those closer than 1e-9 s are one."""
+        """The instants in [0, duration] at which a device sends a sample, s; instants closer than 1e-9 s are the same."""
         return _union([device.sample_times(duration) for device in self.devices])
 
     def look_times(self, duration: float) -> np.ndarray:
-        """The instants that devices look at, s: where the car's outputs are needed."""
+        """The instants at which devices measure, s: the car's outputs are needed there."""
         return _union([device.look_times(duration) for device in self.devices])
 
     def record(self, truth_times: Any, outputs: Mapping[str, Any] | Any, duration: float, key: Any = None) -> Measured:
-        """What all devices say in [0, duration], aligned to the union of the instants at which they speak.
+        """The samples of all devices in [0, duration], aligned to the union of their sample times.
 
         `truth_times` (N,): increasing, known outside jit, with every instant of `look_times` among them (to 1e-9 s:
-        nothing is interpolated). `outputs`: a mapping or NamedTuple of the vehicle's outputs there, (N,) each; they
-        set the dtype, to which the devices' numbers are converted. `key`: one for all, each device has its own part of
-        it, which devices of other classes, their channels and faults do not change; two of a class differ by their order.
-        Without a key nothing is random.
+        there is no interpolation). `outputs`: a mapping or NamedTuple of the vehicle's outputs at these times, (N,)
+        each; they set the dtype, to which the devices' numbers are converted. `key`: one key for all devices. Each
+        device has its own part of it, which does not depend on devices of other classes, their channels or faults; two
+        devices of one class differ by their order. Without a key there are no random errors.
 
-        It may be jitted, vmapped over keys, outputs and devices' numbers, and differentiated. A jitted function sees
-        `truth_times` as a constant.
+        It can be jitted, vmapped over keys, outputs and the devices' numbers, and differentiated. In a jitted function,
+        `truth_times` is a constant.
 
-        **Raises** `InputError` for an instant that is missing, an output that a device needs and the car lacks, an
-        output of another length, or where no device speaks in the duration.
+        **Raises** `InputError` for a missing instant, a missing output that a device needs, an output of another
+        length, or if no device sends a sample within the duration.
         """
         truth_times, outputs = _check_truth(truth_times, as_mapping(outputs, "outputs"))
         times = self.sample_times(duration)
         if not times.size:
-            raise InputError(f"Suite.record: no device speaks in the duration = {duration} s: make it longer.")
+            raise InputError(
+                f"Suite.record: no device sends a sample within the duration = {duration} s: make it longer."
+            )
         channels = {}
         for device, own in zip(self.devices, device_keys(self.devices, key), strict=True):
             check_outputs(device, outputs)
@@ -121,9 +123,10 @@ class Suite(eqx.Module):
 
 
 def device_keys(devices: tuple[AbstractDevice, ...], key: Any) -> list:
-    """The key of each device: by its class (that within all wrappers) and how many of that class come before it.
+    """The key of each device, by its class (inside all wrappers) and the number of devices of that class before it.
 
-    They are behind a name of their own, so that whoever folds small numbers into `key` meets none of them.
+    They are derived from `key` by a separate name, so that they differ from keys that a caller derives from `key` by
+    small numbers.
     """
     own, before, keys = subkey(key, _NAME), Counter(), []
     for device in devices:
@@ -143,7 +146,7 @@ def _read(device: AbstractDevice, times, outputs, key) -> dict[str, jax.Array]:
 
 
 def _union(grids: list[np.ndarray]) -> np.ndarray:
-    """All instants of increasing grids in order, without those that follow another by less than a nanosecond."""
+    """All instants of several increasing grids in order, without those that are within a nanosecond after another."""
     times = np.sort(np.concatenate(grids))
     return times[np.diff(times, prepend=-np.inf) > _SAME]
 
@@ -155,7 +158,7 @@ def _locate(times: np.ndarray, instants: np.ndarray, who: str) -> np.ndarray:
     if lost.any():
         missing = instants[np.argmax(lost)]
         raise InputError(
-            f"Suite.record: {who} looks at t = {missing:.9g} s, which is not among the {times.size} truth_times from "
+            f"Suite.record: {who} measures at t = {missing:.9g} s, which is not among the {times.size} truth_times from "
             f"{times[0]:g} to {times[-1]:g} s. Save the car's outputs at suite.look_times(duration)."
         )
     return rows

@@ -1,4 +1,4 @@
-"""What control units say of torques: from the brake's pressure, from the motor's currents."""
+"""Torques from control units: from the brake's pressure and from the motor's currents."""
 
 from __future__ import annotations
 
@@ -21,33 +21,34 @@ _MOTOR = ("drive_torque", *(f"drive_torque_{wheel}" for wheel in _WHEELS), *(f"t
 
 
 class AbstractTorque(AbstractSignalInstrument):
-    """A device that knows torques (N m) a little late: `lag` (s) is a time constant of the first order; None: none."""
+    """A device that sends torques (N m) with a first-order lag of time constant `lag` (s); None: no lag."""
 
     lag: jax.Array | None = positive("s", default=None)
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The torques that it says."""
+        """The torques that it sends."""
         return self.channels
 
     @property
     def may_use(self) -> tuple[str, ...]:
-        """Nothing else."""
+        """No further outputs."""
         return ()
 
     def torques(self, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
-        """The late torques with their errors, N m."""
+        """The lagged torques with their errors, N m."""
         return self.sent_values(
             {name: first_order_lag(outputs[name], self.lag, self.period) for name in self.channels}, key
         )
 
 
 class BrakeTorque(AbstractTorque):
-    """Braking torque as made of the measured pressure, N m, never negative.
+    """The braking torque that a control unit computes from the measured pressure, N m, never negative.
 
-    - `signals`: the channels and their errors, a mapping to `Signal`: `brake_torque` (the sum) or `brake_torque_fl` ...
-      (at a wheel), each a vehicle output. The pads' friction that is not as assumed is the signal's `scale`.
-    - `lag` (s): time constant of the first order by which what is said is later; None: none.
+    - `signals`: a mapping from channels to their errors (`Signal`). The channels are `brake_torque` (the sum) and
+      `brake_torque_fl` ... (at a wheel), each a vehicle output. A wrong assumption of the pads' friction is the
+      signal's `scale`.
+    - `lag` (s): time constant of the first-order lag of the samples; None: no lag.
 
     **Raises** `InputError` for unknown channels or numbers out of range.
     """
@@ -61,11 +62,11 @@ class BrakeTorque(AbstractTorque):
 
 
 class MotorTorque(AbstractTorque):
-    """Driving torque as made of currents or of an engine's map, N m, of either sign.
+    """The driving torque that a control unit computes from currents or from an engine's map, N m, of either sign.
 
-    - `signals`: the channels and their errors, a mapping to `Signal`: `drive_torque` (the sum at the wheels),
-      `drive_torque_fl` ... or `torque_fl` ... (at a wheel), each a vehicle output. A map's error is the signal's `scale`.
-    - `lag` (s): time constant of the first order by which what is said is later; None: none.
+    - `signals`: a mapping from channels to their errors (`Signal`). The channels are `drive_torque` (the sum at the wheels), and
+      `drive_torque_fl` ... and `torque_fl` ... (at a wheel), each a vehicle output. An error of the map is the signal's `scale`.
+    - `lag` (s): time constant of the first-order lag of the samples; None: no lag.
 
     **Raises** `InputError` for unknown channels or numbers out of range.
     """
@@ -79,7 +80,8 @@ class MotorTorque(AbstractTorque):
 
 
 def first_order_lag(values: jax.Array, lag: jax.Array | None, period: float) -> jax.Array:
-    """The values (n,) through a first-order lag, settled at the first; linear between samples, solved exactly."""
+    """The values (n,) through a first-order lag, settled at the first value; exact for values that are linear between
+    samples."""
     if lag is None:
         return values
     steps = jnp.full(values.shape[0] - 1, period, values.dtype)

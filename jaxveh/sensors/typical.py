@@ -1,4 +1,4 @@
-"""Ready-made suites: what a production car and a test car carry, with the sources of the numbers."""
+"""Ready-made suites of a production car and of a test car, with the sources of the numbers."""
 
 from __future__ import annotations
 
@@ -22,21 +22,22 @@ _KMH = 1 / 3.6
 def production_car(
     wheel_radius: float | None = None, *, steering_ratio: float | None = None, gnss: bool = True
 ) -> Suite:
-    """What the stability control and the navigation of a series car know; which outputs that takes says `needs`.
+    """The sensors of the stability control and the navigation of a series car; `needs` lists the vehicle outputs that
+    they require.
 
-    - Inertial unit, 100 Hz, 10 ms late: `a_x`, `a_y`, `yaw_rate`. Limits 4.2 g and 163 deg/s, steps of 0.0001274 g and
+    - Inertial unit, 100 Hz, delay 10 ms: `a_x`, `a_y`, `yaw_rate`. Limits 4.2 g and 163 deg/s, steps of 0.0001274 g and
       0.005 deg/s: Bosch MM7.10 and MM5.10 (data sheet; CAN list in the ABS M5 Kit manual). Second-order low-pass of 15
-      Hz, noise of 0.05 m/s^2 and 0.1 deg/s, offsets of 0.1 m/s^2 and 0.2 deg/s that walk slowly: our choice, of the size
-      usual for such units.
+      Hz, noise of 0.05 m/s^2 and 0.1 deg/s, offsets of 0.1 m/s^2 and 0.2 deg/s that drift slowly: our choice, typical
+      of such units.
     - Steering angle, 100 Hz: steps of 0.1 deg, at most 780 deg (Bosch LWS, data sheet); 0.5 deg offset and 1 deg of play
-      at the wheel: our choice. With `steering_ratio` it says `steering_wheel`, made of `steer`; without, `steer`, and
-      the numbers are those of the steering wheel over 16.
-    - Wheel speeds, 50 Hz, 20 ms late, with `wheel_radius` (m, as the control unit stores it): 48 teeth, timed edges, zero
-      below 1 km/h, steps of 1/64 km/h, radii off by up to 0.5 %: our choice.
-    - Satellite navigation, 5 Hz, 0.15 s late: 0.05 m/s along and across (the velocity accuracy that receivers of the class
-      of u-blox M8 are sold with), 0.1 m/s upwards, no course below 1 m/s; delay, limit and the factor of two are our choice.
+      at the wheel: our choice. With `steering_ratio` it sends `steering_wheel`, computed from `steer`. Without it, it
+      sends `steer`, and the numbers are those of the steering wheel divided by 16.
+    - Wheel speeds, 50 Hz, delay 20 ms, if `wheel_radius` (m, as stored in the control unit) is given: 48 teeth, timed
+      edges, zero below 1 km/h, steps of 1/64 km/h, radii off by up to 0.5 %: our choice.
+    - Satellite navigation, 5 Hz, delay 0.15 s: 0.05 m/s along and across (the specified velocity accuracy of receivers
+      like the u-blox M8), 0.1 m/s upwards, no course below 1 m/s; delay, limit and the factor of two are our choice.
 
-    `gnss` False leaves the last one out.
+    `gnss=False` leaves out satellite navigation.
     """
     wheels = () if wheel_radius is None else (_wheels(wheel_radius),)
     satellites = (_satellites(),) if gnss else ()
@@ -49,15 +50,15 @@ def proving_ground_car(
     steering_ratio: float | None = None,
     optical_position: tuple[float, float, float] = (2.2, 0.0, 0.0),
 ) -> Suite:
-    """What a car on the proving ground carries: a precise inertial unit and an optical sensor beside the car's own.
+    """The sensors of a car on the proving ground: a precise inertial unit, an optical sensor, and the car's own sensors.
 
-    - Inertial unit of six axes, 100 Hz, 2 ms late: noise 0.01 m/s^2 and 0.02 deg/s, offsets 0.005 m/s^2 and 0.01 deg/s,
-      0.1 % of gain, low-pass 40 Hz; limits 10 g and 300 deg/s. Our choice, of the size of navigation-grade test systems.
-    - Optical sensor `optical_position` (m) from the centre of gravity, 250 Hz, 6 ms late: `v_x`, `v_y` with 0.05 m/s of
-      noise and 0.2 % of gain, silent below 0.3 m/s. Our choice, so that sideslip at 20 m/s is mostly within 0.5 deg (the
-      error that ISO 15037-1 allows, as makers of such systems cite it).
-    - Steering angle and wheel speeds as in `production_car`; satellite navigation with position, 20 Hz, 20 ms
-      late, 0.02 m/s, 0.02 m: our choice, of the size of carrier-phase receivers.
+    - Six-axis inertial unit, 100 Hz, delay 2 ms: noise 0.01 m/s^2 and 0.02 deg/s, offsets 0.005 m/s^2 and 0.01 deg/s, 0.1 % of
+      gain, low-pass 40 Hz; limits 10 g and 300 deg/s. Our choice, typical of navigation-grade test systems.
+    - Optical sensor at `optical_position` (m) from the centre of gravity, 250 Hz, delay 6 ms: `v_x`, `v_y` with noise
+      of 0.05 m/s and a gain error of 0.2 %, NaN below 0.3 m/s. Our choice, so that the error of the sideslip at 20 m/s
+      is mostly within 0.5 deg (the error that ISO 15037-1 allows, as cited by makers of such systems).
+    - Steering angle and wheel speeds as in `production_car`; satellite navigation with position, 20 Hz, delay 20 ms,
+      0.02 m/s, 0.02 m: our choice, typical of carrier-phase receivers.
     """
     precise = Signal(noise=0.01, bias=0.005, scale=1e-3, drift=1e-4, saturation=10 * GRAVITY)
     gyro = Signal(noise=0.02 * _DEGREE, bias=0.01 * _DEGREE, scale=1e-3, drift=1e-3 * _DEGREE, saturation=300 * _DEGREE)

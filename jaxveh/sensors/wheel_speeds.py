@@ -1,4 +1,4 @@
-"""Wheel speeds as a control unit has them: from the edges of a toothed ring that have passed."""
+"""Wheel speeds of a control unit, which counts the edges of toothed rings."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ _SPINS = tuple(f"omega_{wheel}" for wheel in WHEELS)
 _SEEN = {f"omega_{wheel}": f"omega_to_body_{wheel}" for wheel in WHEELS}
 _TEETH_TAG, _START_TAG = 100, 101
 _LONG = 1e3
-"""Seconds since the last edge of a wheel that stands at the start."""
+"""The time (s) since the last edge of a wheel that stands still at the start."""
 
 
 class _Ring(NamedTuple):
-    """What the counter knows of each wheel: the way since the last edge (in teeth), the time since it, the last speed."""
+    """The state of the counter for each wheel: the angle since the last edge (in teeth), the time since it, and the
+    last speed."""
 
     way: Any
     since: Any
@@ -37,22 +38,24 @@ class _Ring(NamedTuple):
 class WheelSpeeds(AbstractInstrument):
     """Wheel speed sensors on toothed rings, with the arithmetic of the unit that counts them.
 
-    - `signals`: the channels and their errors, a mapping to `Signal`: `wheel_speed_fl` ... (m/s, at the stored
-      `radius`) or `omega_fl` ... (rad/s); names alone have no errors. A tyre that is not as large as the stored
-      radius is the signal's `scale`: it spins faster at the same speed. `noise` and so on come on top of the teeth.
-    - `teeth`: edges a revolution. `method`: "M" counts the edges of one period, so that speeds are multiples of
+    - `signals`: a mapping from channels to their errors (`Signal`). The channels are `wheel_speed_fl` ... (m/s, at the
+      stored `radius`) and `omega_fl` ... (rad/s). Channels given as names only have no errors. The difference between a
+      tyre's radius and the stored radius is the signal's `scale`: a smaller tyre spins faster at the same speed.
+      `noise` and the other errors are added to those of the teeth.
+    - `teeth`: edges per revolution. `method`: "M" counts the edges of one period, so that speeds are multiples of
       `2 pi / (teeth period)`; "M/T" divides them by the time between the last edges of two periods, which is exact at
-      constant speed, and between edges holds the last speed as long as no slower one is certain (Ohmae et al., IEEE
-      Trans. Industrial Electronics 29, 1982).
-    - `tooth_error`: standard deviation of each edge's place over the pitch of the teeth ("M/T" only).
-    - `lowest`: below it (in the channel's unit) `below` is said, "zero" or "nan".
-    - `signed`: whether the sensors know the direction; most do not and say the magnitude.
+      constant speed, and between edges keeps the last speed until a lower speed is certain (Ohmae et al., IEEE Trans.
+      Industrial Electronics 29, 1982).
+    - `tooth_error`: standard deviation of the position of each edge, relative to the pitch of the teeth ("M/T" only).
+    - `lowest`: below this speed (in the channel's unit) the channel is zero or NaN, as given by `below`, "zero" or "nan".
+    - `signed`: whether the sensors measure the direction; most do not, and send the magnitude.
 
-    The sensors sit on the body: where the car says `omega_to_body_fl` ..., which differ from `omega_fl` ... by about the
-    pitch rate, they count those. The way between two samples is taken from their mean spin, and the wheel is taken
-    to have turned steadily before the first. Where in a pitch a wheel starts is random (without a key: in the middle).
+    The sensors are fixed to the body: if the car has the outputs `omega_to_body_fl` ..., which differ from `omega_fl`
+    ... by approximately the pitch rate, they count those. The angle between two samples is computed from their mean
+    spin, and the wheel is taken to have turned steadily before the first sample. The position of a wheel between two
+    edges at the start is random (without a key: the middle).
 
-    **Raises** `InputError` for numbers out of range, unknown channels, speeds without a radius.
+    **Raises** `InputError` for numbers out of range, unknown channels, or speeds without a radius.
     """
 
     signals: dict[str, Signal] = eqx.field(converter=as_signals, default=_SPEEDS)
@@ -84,7 +87,7 @@ class WheelSpeeds(AbstractInstrument):
 
     @property
     def units(self) -> dict[str, str]:
-        """m/s or rad/s."""
+        """The unit of each channel, m/s or rad/s."""
         return {name: "m/s" if name in _SPEEDS else "rad/s" for name in self.channels}
 
     @property
@@ -94,12 +97,12 @@ class WheelSpeeds(AbstractInstrument):
 
     @property
     def may_use(self) -> tuple[str, ...]:
-        """The same as seen from the body."""
+        """The spins of these wheels relative to the body."""
         return tuple(_SEEN[name] for name in self.needs)
 
     @property
     def pitch(self) -> float:
-        """Angle from edge to edge, rad."""
+        """The angle from edge to edge, rad."""
         return 2 * math.pi / self.teeth
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
@@ -118,7 +121,7 @@ class WheelSpeeds(AbstractInstrument):
         return jnp.where(jnp.abs(value) < lowest, nothing, value)
 
     def _count(self, omega: jax.Array, key: Any) -> jax.Array:
-        """Spins (n, wheels) as counted from edges."""
+        """The spins (n, wheels) computed from counted edges."""
         spin = 0.5 * (omega + jnp.concatenate([omega[:1], omega[:-1]]))
         teeth = jnp.abs(spin) * (self.period / self.pitch)
         errors = jnp.zeros_like(teeth)
@@ -136,11 +139,11 @@ class WheelSpeeds(AbstractInstrument):
         return _Ring(way, since, self.pitch / self.period * teeth)
 
     def _by_wheel(self, draw: Callable, key: Any, like: jax.Array) -> jax.Array:
-        """Numbers of the shape of `like` for each wheel (last axis), which the other wheels do not change."""
+        """Random numbers in the shape of `like` for each wheel (last axis), independent of which other wheels are measured."""
         return jnp.stack([draw(subkey(key, name), like.shape, like.dtype) for name in self.needs], axis=-1)
 
     def _next(self, ring: _Ring, row: tuple) -> tuple[_Ring, jax.Array]:
-        """One period: `teeth` is the way in it, `error` how far the last edge in it is from its place."""
+        """One period; `row`: the angle turned in it, `teeth`, and the position error of the last edge in it, `error`."""
         teeth, error = row
         gone = ring.way + teeth
         edges = jnp.floor(gone)
@@ -148,7 +151,7 @@ class WheelSpeeds(AbstractInstrument):
         new = edges > 0
         waited = ring.since + self.period
         since = jnp.where(new, (way - error) / jnp.where(new, teeth, 1.0) * self.period, waited)
-        # Errors of two edges may cross where a wheel passes hardly more than one in a period.
+        # By their errors two edges may be in the wrong order if a wheel passes little more than one edge in a period.
         between = jnp.maximum(waited - since, 1e-3 * self.period)
         slower = jnp.minimum(ring.held, self.pitch / waited)
         timed = jnp.where(new, self.pitch * edges / jnp.where(new, between, 1.0), slower)

@@ -1,6 +1,6 @@
-"""Devices around a device: what they do not change is the inner one's."""
+"""Devices that wrap another device and change some of its properties."""
 
-# No postponed annotations here: equinox does not see an AbstractVar in a string.
+# No postponed annotations here: equinox does not recognise an AbstractVar in a string.
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,50 +14,50 @@ from jaxveh.sensors.device import AbstractDevice, name_of
 from jaxveh.sensors.randomness import subkey
 
 _OWN_TAG = 1000
-"""Beyond every tag of a device: a wrapper draws beside the inner device, whose numbers stay what they were."""
+"""Larger than every tag of a device: the draws of a wrapper do not change those of the inner device."""
 
 
 class AbstractDeviceWrapper(AbstractDevice):
-    """A device around another: it looks at what that one looks at, and speaks when that one speaks."""
+    """A device around another, with the vehicle outputs and the sample times of the inner device."""
 
     device: eqx.AbstractVar[AbstractDevice]
 
     @property
     def rate(self) -> float:
-        """The inner device's, Hz."""
+        """The rate of the inner device, Hz."""
         return self.device.rate
 
     @property
     def delay(self) -> float:
-        """The inner device's, s."""
+        """The delay of the inner device, s."""
         return self.device.delay
 
     @property
     def phase(self) -> float:
-        """The inner device's, s."""
+        """The phase of the inner device, s."""
         return self.device.phase
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The inner device's."""
+        """The vehicle outputs that the inner device requires."""
         return self.device.needs
 
     @property
     def may_use(self) -> tuple[str, ...]:
-        """The inner device's."""
+        """Further vehicle outputs that the inner device uses if the car has them."""
         return self.device.may_use
 
     def own_key(self, key: Any) -> Any:
-        """The key of what the wrapper draws itself: another for each wrapper around one device."""
+        """The key for the wrapper's own draws, different for each wrapper around one device."""
         return subkey(key, _OWN_TAG + _depth(self))
 
 
 class Renamed(AbstractDeviceWrapper):
-    """A device whose channels have other names: `names` maps old to new, what it leaves out stays.
+    """A device whose channels have other names: `names` maps old names to new ones; other channels keep their names.
 
-    Two devices of a kind in one suite need it: `Renamed(optical, {"v_x": "optical_v_x"})`.
+    It is needed if a suite has two devices of one class: `Renamed(optical, {"v_x": "optical_v_x"})`.
 
-    **Raises** `InputError` for a name that the device does not say, or a new name that it has twice.
+    **Raises** `InputError` for a name that is not a channel of the device, or a new name that occurs twice.
     """
 
     device: AbstractDevice
@@ -68,7 +68,7 @@ class Renamed(AbstractDeviceWrapper):
         check_names("Renamed.names", dict(self.names), self.device.channels)
         if len(set(self.channels)) < len(self.channels):
             raise InputError(
-                f"Renamed.names = {dict(self.names)}: gives two channels one name: {', '.join(self.channels)}."
+                f"Renamed.names = {dict(self.names)}: gives two channels the same name: {', '.join(self.channels)}."
             )
 
     @property
@@ -82,19 +82,19 @@ class Renamed(AbstractDeviceWrapper):
         return {dict(self.names).get(name, name): unit for name, unit in self.device.units.items()}
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
-        """What the inner device says, under the new names."""
+        """The samples of the inner device, under the new names."""
         said = self.device.say(times, outputs, key)
         return {dict(self.names).get(name, name): value for name, value in said.items()}
 
 
 def check_device(wrapper: AbstractDeviceWrapper) -> None:
-    """Raise unless there is a device inside; to be called before anything is asked of it."""
+    """Raise `InputError` unless there is a device inside; call it before the inner device is used."""
     if not isinstance(wrapper.device, AbstractDevice):
         raise InputError(f"{name_of(wrapper)}.device = {wrapper.device!r}: must be a device, such as IMU(rate=100.0).")
 
 
 def innermost(device: AbstractDevice) -> AbstractDevice:
-    """The device within all wrappers."""
+    """The device inside all wrappers."""
     return innermost(device.device) if isinstance(device, AbstractDeviceWrapper) else device
 
 

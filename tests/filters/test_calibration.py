@@ -95,9 +95,9 @@ def test_the_right_filter_is_at_the_bound_and_no_other():
 
 def test_a_bound_of_something_else_is_refused():
     other = bound()._replace(time=schedule().time[:5])
-    with pytest.raises(InputError, match="has 5 rows at other times than the runs' 40"):
+    with pytest.raises(InputError, match="the times of its 5 rows differ from those of the runs' 40 rows"):
         filters.rmse_beside_bound(runs("right"), other)
-    with pytest.raises(InputError, match="bound: is of y, the runs of x0, x1"):
+    with pytest.raises(InputError, match="bound: its states are y, the runs' x0, x1"):
         filters.rmse_beside_bound(runs("right"), other._replace(std=ss.model.record("X", {"y": np.zeros(5)})))
 
 

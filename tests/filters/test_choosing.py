@@ -199,7 +199,7 @@ class TestAdaptiveNumber:
     def test_sizes_that_do_not_rise_to_the_filter_s_number_are_refused(self):
         with pytest.raises(InputError, match=r"sizes = \(50, 20\)"):
             filters.AdaptiveNumber(filters.ParticleFilter(50), {"x": 1.0}, sizes=(50, 20))
-        with pytest.raises(InputError, match="must resample in every step"):
+        with pytest.raises(InputError, match="so that it resamples in every step"):
             filters.AdaptiveNumber(filters.ParticleFilter(50, threshold=0.5), {"x": 1.0})
         with pytest.raises(InputError, match="bins is empty"):
             filters.AdaptiveNumber(filters.ParticleFilter(50), {})
@@ -224,7 +224,7 @@ class TestMarginalised:
             filters.Marginalised(10, ("x0",)).check(pendulum())
         filters.Marginalised(10, ("x2",)).check(pendulum())
         model = eqx.tree_at(lambda m: m.process_noise, linear_model(2, 1), ss.Continuous(ss.Gaussian({"x0": 0.1})))
-        with pytest.raises(InputError, match="the drawn states x1 carry no process noise"):
+        with pytest.raises(InputError, match="the drawn states x1 have no process noise"):
             filters.Marginalised(10, ("x0",)).check(model)
 
     def test_spreads_count_those_within_and_between_particles(self):

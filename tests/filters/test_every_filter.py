@@ -454,7 +454,7 @@ def test_float32_stays_float32_and_says_the_same(name):
 
 @pytest.mark.parametrize("name", [name for name, line in FILTERS.items() if line.linear])
 def test_what_is_for_linear_models_refuses_others(name):
-    with pytest.raises(InputError, match="state x0 is no linear function"):
+    with pytest.raises(InputError, match="state x0 is not a linear function"):
         FILTERS[name].make().check(pendulum())
 
 

@@ -190,7 +190,7 @@ def test_settings_are_checked():
         filters.ParticleFilter(1)
     with pytest.raises(InputError, match=r"particles = 10\.0"):
         filters.AuxiliaryParticleFilter(10.0)
-    with pytest.raises(InputError, match=r"Unscented\.alpha = SquareRoot\(\): is a form; give it by name"):
+    with pytest.raises(InputError, match=r"Unscented\.alpha = SquareRoot\(\): is a form; pass it by keyword"):
         filters.Unscented(filters.SquareRoot())
     for kind in (filters.ParticleFilter, filters.AuxiliaryParticleFilter):
         with pytest.raises(InputError, match=r"threshold = 1\.5: must be from 0"):

@@ -152,7 +152,7 @@ class TestHaarParticles:
         assert np.isin(drawn, belief.inside.particles.level).all()
 
     def test_what_it_cannot_is_refused(self):
-        with pytest.raises(InputError, match="HaarNoise is for"):
+        with pytest.raises(InputError, match="use HaarNoise"):
             filters.HaarParticles(filters.Kalman())
         with pytest.raises(InputError, match="follows"):
             filters.HaarParticles(filters.ParticleFilter(10), follows="neither")

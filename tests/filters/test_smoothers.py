@@ -203,7 +203,7 @@ def test_a_state_without_noise_has_no_density_to_sample_by():
         system=MODEL.system, transition=MODEL.transition_function, observation=MODEL.observation_function,
         process_noise=law, measurement_noise=MODEL.measurement_noise, prior=MODEL.prior, inputs=MODEL.inputs,
     )  # fmt: skip
-    with pytest.raises(InputError, match="none is on x1, x2"):
+    with pytest.raises(InputError, match="without it: x1, x2"):
         filters.smooth(
             filters.ParticleFilter(10), model, RECORDING, key=jax.random.key(0), method=filters.BackwardSampling()
         )

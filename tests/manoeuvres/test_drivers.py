@@ -205,7 +205,7 @@ class NoSpeed(manoeuvres.AbstractManoeuvre):
 def test_speed_control_needs_a_speed_to_follow():
     motion = Motion(*map(jnp.asarray, (0.0, 0.0, 0.0, 20.0, 0.0, 0.0)))
     driver = SpeedControl(NoSpeed(), MASS)
-    with pytest.raises(InputError, match="the driver gives steer, and no v_x to follow"):
+    with pytest.raises(InputError, match="the driver gives steer, but no v_x to follow"):
         driver.inputs(0.0, motion, driver.start(0.0, motion))
 
 

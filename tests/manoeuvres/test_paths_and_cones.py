@@ -248,7 +248,7 @@ def test_clearance_has_finite_gradients():
         (lambda: Straight(float("inf")), r"Straight\.left = inf: must be finite"),
         (lambda: manoeuvres.iso_3888_1(0.0), r"width = 0\.0: must be positive"),
         (lambda: manoeuvres.centre_line(manoeuvres.iso_3888_2(1.8), 6.0), r"lead = 6\.0: must be between 0 and .* 5\.5 m"),
-        (lambda: manoeuvres.centre_line(COURSE, 1.0), r"course = two gates: 2 lanes; there must be 3"),
+        (lambda: manoeuvres.centre_line(COURSE, 1.0), r"course = two gates: 2 lanes; must have 3"),
         (lambda: manoeuvres.cones(COURSE, spacing=0.0), r"spacing = 0\.0: must be positive"),
         (lambda: manoeuvres.clearance(0.0, 0.0, 0.0, -1.0, 4.0, COURSE), r"width = -1\.0: must be positive"),
         (lambda: manoeuvres.slalom_cones(diameter=0.0), r"diameter = 0\.0: must be positive"),

@@ -206,7 +206,7 @@ def test_an_output_that_the_car_lacks_is_named(device):
     for name in device.needs:
         outputs = truth(device.look_times(1.0))
         del outputs[name]
-        with pytest.raises(InputError, match=rf"looks at {name}, which this car does not have; there are: .*bank"):
+        with pytest.raises(InputError, match=rf"needs {name}, which this car does not have; there are: .*bank"):
             device.read(device.sample_times(1.0), outputs)
 
 

@@ -122,7 +122,7 @@ def test_a_renamed_device_says_the_same_under_other_names():
         (lambda: Dropout(NOISY, probability=-0.1), r"Dropout\.probability = -0\.1: must be between"),
         (lambda: Dropout(NOISY), "neither spans nor a probability"),
         (lambda: Renamed(NOISY, {"v_x": "speed"}), r"Renamed\.names: unknown name\(s\) v_x"),
-        (lambda: Renamed(NOISY, {"a_x": "a_y"}), "gives two channels one name: a_y, a_y, yaw_rate"),
+        (lambda: Renamed(NOISY, {"a_x": "a_y"}), "gives two channels the same name: a_y, a_y, yaw_rate"),
     ],
 )
 def test_bad_input_raises_by_name_value_and_range(make, message):

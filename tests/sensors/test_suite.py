@@ -210,21 +210,27 @@ def bad_times(times):
         (lambda: Suite((STEER, 3)), "device 1 = 3: must be a device"),
         (
             lambda: Suite((OpticalSideslip(rate=1.0), OpticalSideslip("v_y", rate=1.0))),
-            r'both say v_y: every channel needs a name of its own\. Rename one: Renamed\(OpticalSideslip\(\.\.\.\), \{"v_y"',
+            r'both have v_y: every channel needs a name of its own\. Rename one: Renamed\(OpticalSideslip\(\.\.\.\), \{"v_y"',
         ),
         (
             lambda: Suite(SIDE).record([0.0, 1.0], {"a_x": jnp.zeros(2), "a_y": jnp.zeros(2)}, 1.0),
-            "IMU looks at yaw_rate, yaw_acceleration, which this car does not have; there are: a_x, a_y",
+            "IMU needs yaw_rate, yaw_acceleration, which this car does not have; there are: a_x, a_y",
         ),
-        (lambda: bad_times(np.linspace(0, 1, 11)), r"SteeringAngle looks at t = 0\.05 s, which is not among the 11"),
-        (lambda: bad_times([0.0, 0.05, 0.15]), r"looks at t = 0\.25 s, .*from 0 to 0\.15 s\. Save the car's outputs"),
+        (lambda: bad_times(np.linspace(0, 1, 11)), r"SteeringAngle measures at t = 0\.05 s, which is not among the 11"),
+        (
+            lambda: bad_times([0.0, 0.05, 0.15]),
+            r"measures at t = 0\.25 s, .*from 0 to 0\.15 s\. Save the car's outputs",
+        ),
         (lambda: bad_times([0.0, 0.0]), r"truth_times of shape \(2,\): must be \(N,\), finite and strictly"),
         (lambda: bad_times([0.0, np.nan]), "finite and strictly increasing"),
         (
             lambda: Suite(STEER).record([0.0, 1.0], {"steer": jnp.zeros(3)}, 1.0),
             r"steer has shape \(3,\), truth_times has \(2,\)",
         ),
-        (lambda: Suite(SIDE).record([0.0], drive(np.zeros(1)), 0.05), r"no device speaks in the duration = 0\.05"),
+        (
+            lambda: Suite(SIDE).record([0.0], drive(np.zeros(1)), 0.05),
+            r"no device sends a sample within the duration = 0\.05",
+        ),
         (lambda: jax.jit(bad_times)(jnp.arange(3.0)), "truth_times is traced"),
     ],
 )

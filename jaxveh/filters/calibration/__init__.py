@@ -1,4 +1,4 @@
-"""Whether a filter is right on a model: many runs on draws of it, ranks of the truth, scatter of the log-likelihood."""
+"""Tests of a filter on a model: many runs on draws of the model, ranks of the truth, scatter of the log-likelihood."""
 
 from jaxveh.filters.calibration.accuracy import Accuracy, rmse_beside_bound
 from jaxveh.filters.calibration.kept import run_and_keep

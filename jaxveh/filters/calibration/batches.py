@@ -15,7 +15,7 @@ from jaxveh.statespace import StateSpace
 
 
 def check_truth(model: StateSpace, truth: StateSpace) -> None:
-    """Raise `InputError` unless the model that draws has the states, channels and inputs of the filter's."""
+    """Raise `InputError` unless the model that draws has the states, channels and inputs of the filter's model."""
     for what in ("states", "channels", "inputs"):
         ours, theirs = getattr(model, what), getattr(truth, what)
         if ours != theirs:
@@ -25,9 +25,9 @@ def check_truth(model: StateSpace, truth: StateSpace) -> None:
 
 
 def in_batches(one_batch: Callable, key, runs: int, batch: int | None, progress: Progress, stage: str) -> Any:
-    """`one_batch(keys)` of all runs' keys, (R, ...) leaves on the host; `batch` runs at a time (all at once if None).
+    """The results of `one_batch(keys)` over the keys of all runs, `batch` runs at a time (None: all at once).
 
-    The last batch is filled up, so that there is one size and one compilation.
+    Returns leaves (R, ...) on the host. The last batch is filled up, so that there is one size and one compilation.
     """
     batch = runs if batch is None else batch
     check_whole("batch", batch)

@@ -1,4 +1,4 @@
-"""Running a filter and keeping something of every row's belief."""
+"""A filter's run that keeps part of the belief of every row."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ _scan_and_keep = eqx.filter_jit(kit.scan_and_keep)
 def run_and_keep(
     filter: AbstractFilter, model: StateSpace, recording: Recording, keep: Callable, *, key=None, throw: bool = True
 ) -> tuple[Estimate, Any]:
-    """`run`, and `keep(belief)` of every row with (T, ...) leaves: `lambda belief: belief.covariance`, or its `ancestors`.
+    """The estimate of `run`, and `keep(belief)` of every row, with leaves (T, ...).
 
-    A new lambda compiles anew. **Raises** as `run`.
+    For example `lambda belief: belief.covariance`, or the belief's `ancestors`. Each new lambda compiles anew.
+    **Raises** as `run`.
     """
     kit.check_told(filter, model)
     filter.check(model)

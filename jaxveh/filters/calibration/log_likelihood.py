@@ -1,4 +1,4 @@
-"""How much a particle filter's log-likelihood scatters from key to key."""
+"""The scatter of a particle filter's log-likelihood from key to key."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from jaxveh.filters.calibration.monte_carlo import raise_failed
 from jaxveh.statespace import AbstractFilter, StateSpace, scan
 
 GOOD_STD = (1.0, 1.7)
-"""Where the standard deviation of the log-likelihood should be for particle marginal Metropolis-Hastings (A. Doucet, M. Pitt,
-G. Deligiannidis & R. Kohn 2015): about 1.0 where the chain with the exact likelihood would mix well, about 1.7 where it would
-not."""
+"""The range in which the standard deviation of the log-likelihood should lie for particle marginal Metropolis-Hastings
+(A. Doucet, M. Pitt, G. Deligiannidis & R. Kohn 2015): about 1.0 where the chain with the exact likelihood would mix
+well, about 1.7 where it would not."""
 
 
 class LogLikelihoodSpread(NamedTuple):
-    """Log-likelihoods (R,) of one recording from R keys, with their `mean`, `std` and the `standard_error` of std (as
-    of a Gaussian).
+    """Log-likelihoods (R,) of one recording from R keys, with their `mean`, their `std` and its `standard_error` (that
+    of a Gaussian sample).
 
-    `log_mean_likelihood`: the logarithm of the mean of the likelihoods, which are unbiased; the log-likelihoods themselves are
-    about std^2 / 2 too low in the mean.
+    `log_mean_likelihood`: the logarithm of the mean of the likelihoods, which are unbiased. The log-likelihoods
+    themselves are on average about std^2 / 2 too low.
     """
 
     log_likelihoods: np.ndarray
@@ -38,13 +38,14 @@ class LogLikelihoodSpread(NamedTuple):
 
     @property
     def good_for_pmmh(self) -> bool:
-        """Whether std is from 1.0 to 1.7 (`GOOD_STD`): more wastes iterations, less wastes particles."""
+        """Whether std is from 1.0 to 1.7 (`GOOD_STD`): a larger one wastes iterations, a smaller one particles."""
         return GOOD_STD[0] <= self.std <= GOOD_STD[1]
 
     def particles_for(self, particles: int, std: float = 1.2) -> int:
-        """How many particles would give about this `std`, where `particles` gave ours: the variance goes as 1 / N.
+        """The number of particles that would give about this `std`, if `particles` gave `self.std`: the variance goes as 1 / N.
 
-        For a std well below 2 or 3; above, go step by step. 1.2 serves where it is not known how the chain mixes.
+        It holds for a `std` well below 2 or 3; above that, go in several steps. 1.2 is a good choice if it is unknown
+        how the chain mixes.
         """
         check_positive("std", std)
         check_positive("particles", particles)
@@ -62,11 +63,12 @@ def log_likelihood_spread(
     progress: Progress = silent,
     throw: bool = True,
 ) -> LogLikelihoodSpread:
-    """The scatter of a filter's log-likelihood of one recording over keys; at least two `runs` (50 give std to 10 %).
+    """The scatter over keys of a filter's log-likelihood of one recording.
 
-    `batch`, `progress` and `throw` as in `monte_carlo`. For particle Metropolis-Hastings, look at it near the posterior's mean.
+    `batch`, `progress` and `throw` as in `monte_carlo`. For particle Metropolis-Hastings, compute it near the
+    posterior's mean. `runs`: at least two (50 give the standard deviation to 10 %).
 
-    **Raises** `InputError` where things do not go together or the filter draws nothing; `FilterError` where runs fail.
+    **Raises** `InputError` where the arguments do not agree or the filter draws nothing; `FilterError` where runs fail.
     """
     check_whole("runs", runs, 2)
     check_key("log_likelihood_spread", key)

@@ -1,4 +1,4 @@
-"""A filter on many draws of a model, with the truth beside it."""
+"""A filter's runs on many draws of a model, with the truth."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ from jaxveh.statespace import AbstractFilter, Info, StateSpace, kit
 
 
 class Runs(NamedTuple):
-    """A filter on R independent draws of a model, arrays of the host.
+    """A filter's runs on R independent draws of a model, as arrays on the host.
 
-    `time` (T,); `states`: the truth, the state's NamedTuple with (R, T) in each field; `mean`: the belief's, likewise;
+    `time` (T,); `states`: the truth, the state's NamedTuple with (R, T) in each field; `mean`: the belief's mean, likewise;
     `covariance` (R, T, n, n) of the belief in the order of the states; `info`: `filters.Info` with (R, T) leaves;
-    `log_likelihood` (R,); `result` (R,) first failing codes. States are the model's own (parameters on the real line).
+    `log_likelihood` (R,); `result` (R,) the first failing code of each run. States are the model's own (parameters on
+    the real line).
     """
 
     time: np.ndarray
@@ -50,13 +51,13 @@ def monte_carlo(
     progress: Progress = silent,
     throw: bool = True,
 ) -> Runs:
-    """Run a filter on draws of a model: what NIS, NEES, whiteness and root mean square errors are made of.
+    """Run a filter on draws of a model, for NIS, NEES, whiteness and root mean square errors.
 
     **Arguments**: `schedule`: times, inputs and missing measurements of every run (see `statespace.draw`); `truth`: the model
-    that draws, where it is not the filter's own, with the same states, channels and inputs; `batch`: runs at a time (default
-    all), where memory is short; `progress(done, total, stage)` is called between batches.
+    that draws, if it is not the filter's own, with the same states, channels and inputs; `batch`: the number of runs at
+    a time (default all), if memory is short; `progress(done, total, stage)` is called between batches.
 
-    **Raises** `InputError` where filter, model, truth and schedule do not go together; `FilterError` where runs fail, unless
+    **Raises** `InputError` where filter, model, truth and schedule do not agree; `FilterError` where runs fail, unless
     `throw=False`.
     """
     truth = model if truth is None else truth
@@ -76,13 +77,13 @@ def monte_carlo(
 
 
 def raise_failed(filter: AbstractFilter, results: np.ndarray) -> None:
-    """Raise `FilterError` saying how many of the runs failed, and why the first did."""
+    """Raise `FilterError` with the number of failed runs and the reason of the first failure."""
     failed = np.flatnonzero(results)
     if failed.size:
         reason = Result(int(results[failed[0]])).message
         raise FilterError(
             f"{type(filter).__name__} failed in {failed.size} of {results.size} runs, first in run {failed[0]}: {reason}. "
-            "throw=False returns what there is."
+            "throw=False returns the runs as they are."
         )
 
 

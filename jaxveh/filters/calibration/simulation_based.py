@@ -25,9 +25,10 @@ class CalibrationRanks(NamedTuple):
     draws: int
 
     def histogram(self, bins: int = 10) -> Any:
-        """How many runs fell into each bin of ranks: the state's NamedTuple with (bins,) in each field.
+        """The number of runs in each bin of ranks: the state's NamedTuple with (bins,) in each field.
 
-        A hump in the middle: the belief is too wide; heaps at both ends: too narrow; a slope: biased.
+        A hump in the middle means that the belief is too wide, heaps at both ends that it is too narrow, a slope that
+        it is biased.
 
         **Raises** `InputError` unless `bins` divides draws + 1.
         """
@@ -39,9 +40,10 @@ class CalibrationRanks(NamedTuple):
         return type(self.ranks)(*[np.bincount(rank // width, minlength=bins) for rank in self.ranks])
 
     def p_values(self, bins: int = 10) -> Any:
-        """Pearson's chi-squared test of uniform ranks: the probability of at least so uneven a histogram, by state.
+        """Pearson's chi-squared test of uniform ranks: by state, the probability of a histogram at least as uneven.
 
-        **Raises** `InputError` as `histogram`, and for fewer than five runs a bin, where the test's law does not hold.
+        **Raises** `InputError` as `histogram`, and for fewer than five runs per bin, where the test's distribution does
+        not hold.
         """
         runs = len(self.ranks[0])
         if runs < 5 * bins:
@@ -51,7 +53,7 @@ class CalibrationRanks(NamedTuple):
         return type(self.ranks)(*[p_value(counts) for counts in self.histogram(bins)])
 
     def is_calibrated(self, level: float = 0.01, bins: int = 10) -> bool:
-        """Whether no state's test rejects, so that a right filter is rejected with probability `level` at most (Bonferroni)."""
+        """Whether no state's test rejects; a correct filter is rejected with a probability of at most `level` (Bonferroni)."""
         check("level", level, lambda p: (p > 0) & (p < 1), "above 0 and below 1")
         return min(self.p_values(bins)) >= level / len(self.ranks)
 
@@ -69,11 +71,11 @@ def simulation_based_calibration(
     progress: Progress = silent,
     throw: bool = True,
 ) -> CalibrationRanks:
-    """Rank the true last state among `draws` of the belief after the last row, over `runs` draws of the model.
+    """Rank the true last state among `draws` from the belief after the last row, in each of `runs` draws of the model.
 
-    Over draws from prior and model, truth and belief are exchangeable, so that all ranks are equally likely, whatever the model,
-    if the filter is exact (S. Talts, M. Betancourt, D. Simpson, A. Vehtari & A. Gelman 2018). A particle filter is only with
-    many particles; a Gaussian filter only where beliefs are Gaussian.
+    If the filter is exact, the truth and the draws from the belief are exchangeable, so that all ranks are equally
+    likely, whatever the model (S. Talts, M. Betancourt, D. Simpson, A. Vehtari & A. Gelman 2018). A particle filter is
+    exact only with many particles, a Gaussian filter only where beliefs are Gaussian.
 
     **Arguments**: as `monte_carlo`. **Raises** likewise.
     """

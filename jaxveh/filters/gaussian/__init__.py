@@ -1,4 +1,4 @@
-"""Gaussian filters: one algebra, a rule that approximates functions, a form that keeps the covariance."""
+"""Gaussian filters: one algebra, with a rule that approximates functions and a form that stores the covariance."""
 
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.family import (

@@ -1,4 +1,4 @@
-"""What a Gaussian filter knows."""
+"""The belief of a Gaussian filter."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from jaxveh.statespace import AbstractBelief
 
 
 class GaussianBelief(AbstractBelief):
-    """A Gaussian over the state: mean as a vector (n,), a factor F (n, n) of the covariance P = F F^T, in the order of the
-    state's fields; `matrix` is P where the filter's form keeps it, else None."""
+    """A Gaussian over the state, in the order of the state's fields. `vector`: the mean (n,); `factor`: a factor F (n, n) of the
+    covariance P = F F^T; `matrix`: P if the filter's form stores it, otherwise None."""
 
     vector: jax.Array
     factor: jax.Array
@@ -28,26 +28,26 @@ class GaussianBelief(AbstractBelief):
 
     @property
     def mean(self):
-        """The state's mean (parameters on the real line), the state's NamedTuple."""
+        """The state's mean (parameters on the real line), as the state's NamedTuple."""
         return self.state_type(*self.vector)
 
     @property
     def std(self):
-        """The state's standard deviations, the state's NamedTuple."""
+        """The state's standard deviations, as the state's NamedTuple."""
         return self.state_type(*jnp.sqrt(self.variances))
 
     @property
     def variances(self):
-        """(n,) in the order of the state's fields."""
+        """The variances (n,), in the order of the state's fields."""
         return jnp.diagonal(self.matrix) if self.matrix is not None else jnp.sum(jnp.square(self.factor), axis=-1)
 
     @property
     def covariance(self):
-        """(n, n) in the order of the state's fields."""
+        """The covariance (n, n), in the order of the state's fields."""
         return self.matrix if self.matrix is not None else times(self.factor, self.factor.T)
 
     def inflate(self, factor: Any) -> GaussianBelief:
-        """The belief with `factor` times its covariance."""
+        """The belief with its covariance multiplied by `factor`."""
         matrix = None if self.matrix is None else factor * self.matrix
         root = numerics.sqrt(factor) * self.factor
         return GaussianBelief(self.vector, root, matrix, self.t, self.u, self.count, self.state_type, self.rule)
@@ -65,7 +65,7 @@ class GaussianBelief(AbstractBelief):
         image = self.rule.image(shown, self.vector, self.factor)
         spread = spread_of(image)
         kind = names[0]
-        # A weight may be negative, so that rounding can leave a spread a little below zero.
+        # A weight may be negative, so that rounding can leave a variance a little below zero.
         return kind(*image.mean), kind(*numerics.sqrt(jnp.maximum(spread, 0.0)))
 
 

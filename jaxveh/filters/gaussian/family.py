@@ -1,4 +1,4 @@
-"""The Kalman family: one filter a rule."""
+"""The Kalman family: one filter per rule."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Kalman(AbstractRuleFilter):
 
 
 class Extended(AbstractRuleFilter):
-    """The extended Kalman filter of first order, by slopes at the mean (Sarkka 2013, sec. 5.2)."""
+    """The extended Kalman filter of first order, which linearises at the mean (Sarkka 2013, sec. 5.2)."""
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
     form: AbstractForm = Covariance()
@@ -64,7 +64,10 @@ class Unscented(AbstractRuleFilter):
 
 
 class Simplex(AbstractRuleFilter):
-    """The unscented filter with the fewest points: n+2 on a spherical simplex, one of them central (S. Julier 2003)."""
+    """The unscented filter with the fewest points: n+2, on a spherical simplex and at its centre (S. Julier 2003).
+
+    `central`: weight of the point at the centre.
+    """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
     central: float = eqx.field(static=True, default=0.0)
@@ -86,7 +89,7 @@ class Cubature(AbstractRuleFilter):
 
 
 class GaussHermite(AbstractRuleFilter):
-    """The Gauss-Hermite Kalman filter with `order` points an axis, order^n in all (Ito & Xiong 2000; Sarkka 2013, sec. 6.3)."""
+    """The Gauss-Hermite Kalman filter with `order` points per axis, order^n in all (Ito & Xiong 2000; Sarkka 2013, sec. 6.3)."""
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
     order: int = eqx.field(static=True, default=3)
@@ -97,7 +100,7 @@ class GaussHermite(AbstractRuleFilter):
 
 
 class SigmaPointFilter(AbstractRuleFilter):
-    """A filter by points of one's own: `points(n)` makes the `numerics.SigmaPoints` for n states."""
+    """A filter with sigma points of the caller's own: `points(n)` gives the `numerics.SigmaPoints` for n states."""
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
     points: Callable[[int], sigma_points.SigmaPoints] = eqx.field(static=True)

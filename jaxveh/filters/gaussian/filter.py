@@ -1,4 +1,4 @@
-"""What every Gaussian filter does: predict, update, and both as one step."""
+"""The steps of every Gaussian filter: prediction, update, and both together."""
 
 import abc
 import dataclasses
@@ -33,8 +33,8 @@ from jaxveh.statespace import (
 class AbstractGaussianFilter(AbstractTwoPartFilter):
     """A filter whose belief is a Gaussian, with additive noises that have covariances (S. Sarkka, 2013, ch. 5 and 6).
 
-    A step is `predict_between`, then `update`; both are public, for sensors of different rates, as is `observe`, what a
-    measurement would be. Wrappers go around these. Differentiable with respect to every array leaf of the model.
+    A step is `predict_between`, then `update`. Both are public, for sensors of different rates, and so is `observe`, the
+    predicted measurement. Wrappers wrap these three. The filter is differentiable with respect to every array leaf of the model.
     """
 
     whitens: ClassVar[bool] = True
@@ -50,24 +50,24 @@ class AbstractGaussianFilter(AbstractTwoPartFilter):
 
     @abc.abstractmethod
     def predict_between(self, model: StateSpace, belief: Any, t, u_next) -> Any:
-        """The belief at time `t`, with the inputs `u_next` there (where the model's inputs run linearly)."""
+        """The belief at time `t`, where the inputs are `u_next` (used where the model's inputs run linearly over a step)."""
 
     @abc.abstractmethod
     def observe(self, model: StateSpace, belief: Any, row: Row) -> Image:
-        """What the row's measurement would be under the belief, without noise, as rows in the order of the channels."""
+        """The image of the belief under the observation, without noise, as rows in the order of the channels."""
 
     @abc.abstractmethod
     def update(self, model: StateSpace, belief: Any, row: Row) -> tuple[Any, Info]:
-        """The belief after the row's measurement, at the belief's own time (row.t is taken over, not propagated to)."""
+        """The belief after the row's measurement, at the belief's own time (it takes over row.t without propagating to it)."""
 
     @abc.abstractmethod
     def adapted_model(self, model: StateSpace, belief: Any) -> StateSpace:
-        """The model with the noises that this filter takes for true, given what it has seen."""
+        """The model with the noises that this filter estimates from the rows so far."""
 
     @property
     def linearisations(self) -> int | None:
-        """How many times its update linearises the observation, 0 of a filter of linear models, where a smoother over all rows
-        at once (`smooth_parallel`) does what it does; None: it is a loop over the rows alone."""
+        """How many times the update linearises the observation (0: a filter of linear models), for a filter that can
+        run over all rows at once (`smooth_parallel`); None if it runs row by row only."""
         return None
 
     def predict(self, model: StateSpace, belief: Any, t) -> Any:
@@ -85,15 +85,15 @@ class AbstractGaussianFilter(AbstractTwoPartFilter):
 
 
 class AbstractRuleFilter(AbstractGaussianFilter):
-    """A Gaussian filter by a `rule(n)` that approximates functions, and the `form` in which it keeps its covariance.
+    """A Gaussian filter with a `rule(n)` that approximates functions and a `form` that stores its covariance.
 
-    Measurement noise that depends on the state (`StateDependent`) counts with its covariance at the prediction's mean.
+    Measurement noise that depends on the state (`StateDependent`) is taken with its covariance at the prediction's mean.
 
     Points are drawn anew after the prediction, so that the update sees the process noise (on linear models this is the exact
     Kalman filter).
     """
 
-    # No postponed annotations in this file: they would make a field of it.
+    # No postponed annotations in this file: they would turn this into a field.
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     written_out: ClassVar[bool] = True
@@ -104,7 +104,9 @@ class AbstractRuleFilter(AbstractGaussianFilter):
             value = getattr(self, entry.name)
             if entry.name != "form" and isinstance(value, AbstractForm):
                 kind, form = type(self).__name__, type(value).__name__
-                raise InputError(f"{kind}.{entry.name} = {form}(): is a form; give it by name, {kind}(form={form}()).")
+                raise InputError(
+                    f"{kind}.{entry.name} = {form}(): is a form; pass it by keyword, {kind}(form={form}())."
+                )
 
     @property
     def gradients(self):
@@ -140,24 +142,25 @@ class AbstractRuleFilter(AbstractGaussianFilter):
 
 
 MOST_LOST = 1e-3
-"""Of what is averaged over points, the share that rounding may take before a warning."""
+"""The largest share of an average over points that rounding may take without a warning."""
 
 
 def check_weights(filter: AbstractRuleFilter, model: StateSpace) -> None:
-    """Raise `InputError` where the form needs positive weights and the rule has others; warn where rounding ruins them."""
+    """Raise `InputError` where the form needs positive weights and the rule has negative ones; warn where rounding
+    ruins the averages."""
     form = type(filter.form)
     if not form.negative_weights and not filter.rule(len(model.states)).positive:
         raise InputError(
             f"{type(filter).__name__}: a weight is negative for {len(model.states)} states, which {form.__name__} cannot take. "
-            "Use weights without (alpha = 1, kappa >= 0), or Covariance()."
+            "Use positive weights (alpha = 1, kappa >= 0), or Covariance()."
         )
     rule, dtype = filter.rule(len(model.states)), model.prior.mean[0].dtype
     lost = rule.amplification * float(jnp.finfo(dtype).eps)
     if lost > MOST_LOST:
-        # Words that do not change with the numbers are shown once.
+        # Python shows a warning once if its words do not change with the numbers.
         warnings.warn(
             f"{type(filter).__name__}: its weights cancel each other, so that in {dtype} means are rounded to {lost:.1g} of "
-            "their size: estimates and likelihoods are wrong by more. Take points further out (alpha = 1, the default), "
+            "their size, and estimates and likelihoods have larger errors. Take points further out (alpha = 1, the default), "
             "or float64.",
             JaxvehWarning,
             stacklevel=3,
@@ -167,7 +170,7 @@ def check_weights(filter: AbstractRuleFilter, model: StateSpace) -> None:
 def correct(
     form: AbstractForm, model: StateSpace, belief: GaussianBelief, row: Row, image: Image
 ) -> tuple[GaussianBelief, Info]:
-    """The belief after a row whose measurement has this image under it."""
+    """The belief after a row and its info, where `image` is that of the belief under the observation."""
     measured, present = kit.presence(model, row)
     here = jnp.stack([present[name] for name in model.channels])
     given = jnp.stack([measured[name] for name in model.channels])
@@ -181,7 +184,7 @@ def correct(
 
 
 def check_covariances(name: str, model: StateSpace) -> None:
-    """Raise `InputError` where a law of the model has no covariance."""
+    """Raise `InputError` where a noise or the prior of the model has no covariance."""
     laws = {"measurement noise": kind_of_law(model), "prior": model.prior.law}
     if model.process_noise is not None:
         laws["process noise"] = model.process_noise.law
@@ -194,7 +197,7 @@ def check_covariances(name: str, model: StateSpace) -> None:
 
 
 def kind_of_law(model: StateSpace) -> AbstractNoise:
-    """The law of the measurement noise; where it depends on the state, that of the prior's mean, its numbers unknown."""
+    """The law of the measurement noise; where it depends on the state, the law at the prior's mean, without numbers."""
     if not isinstance(model.measurement_noise, StateDependent):
         return model.measurement_noise
     number = jax.ShapeDtypeStruct((), model.prior.mean[0].dtype)
@@ -205,9 +208,9 @@ def kind_of_law(model: StateSpace) -> AbstractNoise:
 
 
 def check_kind(who: str, filter: Any, kind: type) -> None:
-    """Raise `InputError` unless the filter is of the kind that a wrapper goes around."""
+    """Raise `InputError` unless the filter is of the kind that a wrapper can wrap."""
     if not isinstance(filter, kind):
-        what = "a Gaussian filter by itself: wrappers go around" if kind is AbstractRuleFilter else "a Gaussian filter"
+        what = "an unwrapped Gaussian filter" if kind is AbstractRuleFilter else "a Gaussian filter"
         raise InputError(f"{who}: {type(filter).__name__} inside: must be {what} (Kalman, Extended, Unscented, ...).")
 
 
@@ -219,7 +222,7 @@ def check_gaussian(who: str, what: str, law: AbstractNoise, advice: str = "Use P
 
 
 def with_spread(belief: GaussianBelief, vector: Any, spread: Spread, t=None, u=None, count=None) -> GaussianBelief:
-    """The belief with another Gaussian, and another time, inputs and count where given."""
+    """The belief with another Gaussian, and with another time, inputs and count where these are given."""
     return GaussianBelief(
         vector,
         *spread,
@@ -253,7 +256,7 @@ def observation_image(model: StateSpace, belief: GaussianBelief, row: Row, prese
 
 
 def unwrap(model: StateSpace, name: str, values: Any) -> Any:
-    """A channel's values (k, ...), angles among them within half a turn of the first; a single one as it is."""
+    """A channel's values (k, ...); angles lie within half a turn of the first. A single value is unchanged."""
     if name not in model.angles or not values.ndim:
         return values
     return values[0] + numerics.wrap_angle(values - values[0])
@@ -269,7 +272,8 @@ def wrapped_innovation(model: StateSpace, innovation: Any, here: Any) -> Any:
 
 
 def innovation_info(model: StateSpace, row: Row, innovation: Any, white: Any, factor: Any, result: Any) -> Info:
-    """The info of innovations (m,) with a covariance of this lower factor (m, m), by which `white` is whitened."""
+    """The info of innovations (m,) whose covariance has the lower factor `factor` (m, m); `white` (m,) are the
+    innovations whitened by it."""
     _, present = kit.presence(model, row)
     dtype = innovation.dtype
     count = jnp.sum(jnp.stack([present[name] for name in model.channels]).astype(dtype))
@@ -288,7 +292,7 @@ def innovation_info(model: StateSpace, row: Row, innovation: Any, white: Any, fa
 
 
 def _result(model, row, beliefs, image: Image, factor):
-    """The first thing that went wrong, in the order of the computation: what follows from it is not finite either."""
+    """The code of the first failure in the order of the computation: after it nothing is finite."""
     before, after = beliefs
     diverged, indefinite = Result.non_finite_state, Result.not_positive_definite
     result = kit.input_result(model, row)

@@ -1,4 +1,5 @@
-"""In which form a Gaussian filter keeps its covariance: whole, as a triangular factor, or as a factor of singular vectors."""
+"""The forms in which a Gaussian filter stores its covariance: the matrix, a triangular factor, or a factor of singular
+vectors."""
 
 import abc
 from typing import Any, ClassVar, NamedTuple
@@ -13,15 +14,15 @@ from jaxveh.statespace import AbstractNoise
 
 
 class Spread(NamedTuple):
-    """A covariance P (n, n) by a factor F with P = F F^T, and P itself as `matrix` where the form keeps it, else None."""
+    """A `factor` F of a covariance P (n, n), with P = F F^T, and P itself as `matrix` if the form stores it, otherwise None."""
 
     factor: Any
     matrix: Any
 
 
 class Conditioned(NamedTuple):
-    """What a measurement makes of a Gaussian: lower factor S of the innovation's covariance (m, m), the innovation whitened
-    by it (m,), the mean's `shift` (n,) and the `spread` after it."""
+    """A Gaussian conditioned on a measurement: the lower factor of the innovation's covariance (m, m), the innovation
+    whitened by it, `white` (m,), the `shift` (n,) of the mean, and the `spread` after the measurement."""
 
     innovation_factor: Any
     white: Any
@@ -30,14 +31,14 @@ class Conditioned(NamedTuple):
 
 
 class Later(NamedTuple):
-    """The smoothed Gaussian after a transition: `shift` (n,), its mean less the predicted one, and its `spread`."""
+    """The smoothed Gaussian after a transition: its mean less the predicted mean, `shift` (n,), and its `spread`."""
 
     shift: Any
     spread: Spread
 
 
 class Smoothed(NamedTuple):
-    """The mean's `shift` (n,) by what came later, the smoothed `spread`, and the `gain` (n, n) from one to the other."""
+    """The `shift` (n,) of the mean by the later measurements, the smoothed `spread`, and the smoother's `gain` (n, n)."""
 
     shift: Any
     spread: Spread
@@ -45,14 +46,14 @@ class Smoothed(NamedTuple):
 
 
 class AbstractForm(eqx.Module):
-    """The algebra of covariances of a filter.
+    """The algebra of a filter's covariances.
 
-    What a form can is declared where it is true, and is *no* otherwise:
+    A form declares its properties, which are False by default:
 
-    - `negative_weights`: it takes rules of which some weights are negative.
-    - `keeps_matrix`: each `Spread` has the covariance itself as its `matrix`.
+    - `negative_weights`: it takes rules with negative weights.
+    - `keeps_matrix`: each `Spread` has the covariance as its `matrix`.
     - `triangular`: each factor is lower triangular.
-    - `differentiable`: its derivatives are slopes of its values.
+    - `differentiable`: its values have correct derivatives.
     """
 
     negative_weights: ClassVar[bool] = False
@@ -62,7 +63,7 @@ class AbstractForm(eqx.Module):
 
     @abc.abstractmethod
     def start(self, covariance: Any) -> Spread:
-        """The form of a covariance (n, n)."""
+        """The `Spread` of a covariance (n, n)."""
 
     @abc.abstractmethod
     def add(self, image: Image, law: AbstractNoise | None, fields: tuple[str, ...]) -> Spread:
@@ -72,24 +73,24 @@ class AbstractForm(eqx.Module):
     def condition(
         self, image: Image, law: AbstractNoise, fields: tuple[str, ...], here: Any, innovation: Any, before: Spread
     ) -> Conditioned:
-        """The Gaussian `before`, given an innovation (m,) of the `fields`, those that are `here` (m,).
+        """The Gaussian `before`, conditioned on an innovation (m,) of those `fields` that are `here` (m,).
 
-        A missing channel counts as independent with unit variance and zero innovation: it changes nothing. The image's
-        deviations are zero there.
+        A missing channel has an independent error of unit variance and zero innovation, so that it changes nothing. The
+        image's deviations must be zero there.
         """
 
     @abc.abstractmethod
     def smooth(
         self, image: Image, law: AbstractNoise | None, fields: tuple[str, ...], before: Spread, later: Later
     ) -> Smoothed:
-        """The Gaussian `before` a transition with this image, given what is known `later`, of the state after it.
+        """The Gaussian `before` a transition with this image, given the smoothed Gaussian `later` of the state after it.
 
         (H. Rauch, F. Tung & C. Striebel 1965; S. Sarkka, 2013, eqs 8.6 and 10.1.)
         """
 
 
 class Covariance(AbstractForm):
-    """The covariance itself, with its Cholesky factor for the points: the fastest.
+    """The covariance itself, with its Cholesky factor for the points: the fastest form.
 
     S = E W E^T + R,    K = X W E^T S^-1,    P+ = P - K S K^T
     """
@@ -128,7 +129,7 @@ class Covariance(AbstractForm):
 
 
 class SquareRoot(AbstractForm):
-    """A lower triangular factor, never the covariance: it stays positive definite whatever the rounding, in float32 too.
+    """A lower triangular factor instead of the covariance, which stays positive definite under rounding, also in float32.
 
     Array algorithms, each one triangularisation (P. Kaminski, A. Bryson & S. Schmidt 1971; T. Kailath, A. Sayed & B. Hassibi,
     Linear Estimation, sec. 12.1), with N the noise's factor:
@@ -160,7 +161,8 @@ class SquareRoot(AbstractForm):
         n = X.shape[0]
         above = _with_noise(image.deviations, law, fields)
         below = jnp.pad(X, ((0, 0), (0, above.shape[1] - X.shape[1])))
-        # Conditioned on the later state, as by a measurement: what it leaves open, and what it passes on.
+        # The earlier state is conditioned on the later one, as on a measurement. To the rest of its covariance, the
+        # smoothed covariance of the later state is added by the gain.
         whole = numerics.lower_factor(_wide(jnp.concatenate([above, below])))
         gain = numerics.solve_lower_transposed(whole[:n, :n], whole[n:, :n].T).T
         factor = numerics.lower_factor(jnp.concatenate([whole[n:, n:], times(gain, later.spread.factor)], axis=1))
@@ -168,11 +170,11 @@ class SquareRoot(AbstractForm):
 
 
 class SingularValues(AbstractForm):
-    """The factor U sqrt(D) of the covariance's singular value decomposition U D U^T, as the federated cubature filter
-    of Ji, Li & Fan takes its points.
+    """The factor U sqrt(D) of the covariance's singular value decomposition U D U^T, from which the federated cubature
+    filter of Ji, Li & Fan takes its points.
 
-    The decomposition is of deviations, never of the covariance. Where singular values coincide their vectors are not defined,
-    and with them the points of nonlinear functions and the derivatives: this form cannot be differentiated.
+    The deviations are decomposed, not the covariance. If singular values coincide, their vectors are undefined, and so
+    are the points for nonlinear functions and the derivatives: this form cannot be differentiated.
     """
 
     def start(self, covariance):
@@ -202,20 +204,20 @@ class SingularValues(AbstractForm):
 
 
 def _with_noise(deviations, law, fields):
-    """The deviations (n, k) beside the noise's factor, a column for each field that carries noise."""
+    """The deviations (n, k) next to the noise's factor, which has one column per field with noise."""
     if law is None:
         return deviations
     return jnp.concatenate([deviations, factor_in(law, fields, deviations.dtype)], axis=1)
 
 
 def masked_factor(law, fields, here, dtype):
-    """A lower factor (m, m) of the measurement noise, of unit variance and independent where a channel is missing."""
+    """A lower factor (m, m) of the measurement noise; a missing channel has independent noise of unit variance."""
     both = here[:, None] & here[None, :]
     return numerics.cholesky(jnp.where(both, covariance_in(law, fields, dtype), jnp.eye(len(fields), dtype=dtype)))
 
 
 def _wide(matrix):
-    """At least as many columns as rows, by columns of zeros."""
+    """The matrix with columns of zeros added until it has as many columns as rows."""
     short = matrix.shape[0] - matrix.shape[1]
     return matrix if short <= 0 else jnp.pad(matrix, ((0, 0), (0, short)))
 

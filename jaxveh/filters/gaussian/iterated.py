@@ -1,4 +1,4 @@
-"""The update again and again, linearised where the last one ended."""
+"""An iterated update, linearised anew at the last result."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from jaxveh.statespace import Smoothing
 class Iterated(AbstractStateless):
     """`inner`, whose update is repeated with the observation linearised under the last posterior.
 
-    With `Extended` the iterated extended Kalman filter, Gauss-Newton for the most probable state (B. Bell & F. Cathey 1993);
-    with points iterated posterior linearisation (A. Garcia-Fernandez, L. Svensson, M. Morelande & S. Sarkka 2015): the
-    observation becomes `A x + b` with an error of covariance Lambda, which the points see. Innovation, NIS and
-    log-likelihood stay those of the prediction. A linear observation is left alone by every iteration.
+    With `Extended` it is the iterated extended Kalman filter, Gauss-Newton for the most probable state (B. Bell & F. Cathey
+    1993). With points it is iterated posterior linearisation (A. Garcia-Fernandez, L. Svensson, M. Morelande & S. Sarkka 2015):
+    the observation becomes `A x + b` with an error of covariance Lambda that the points give. Innovation, NIS and
+    log-likelihood are those of the prediction. With a linear observation the iterations change nothing.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
@@ -56,7 +56,8 @@ class Iterated(AbstractStateless):
 
 
 def linearise_image(image: Image, vector: Any, factor: Any, belief: Any) -> Image:
-    """The image under `belief` of the line, with error, that an image under the Gaussian (vector, factor) stands for."""
+    """The image under `belief` of the linear function with error that follows from `image`, the image of the Gaussian with
+    mean `vector` and this `factor`."""
     slope, rest = line_through(image, factor)
     X = image.spread
     mean = image.mean + times(slope, belief.vector - vector)
@@ -67,7 +68,7 @@ def linearise_image(image: Image, vector: Any, factor: Any, belief: Any) -> Imag
 
 
 def line_through(image: Image, factor: Any) -> tuple[Any, Any]:
-    """The slope A (m, n) of the line that an image under a Gaussian with this factor stands for, and its error's deviations.
+    """The slope A (m, n) and the error's deviations of the linear fit to an image under a Gaussian with this factor.
 
     A = E W X^T P^-1,    Lambda = (E - A X) W (E - A X)^T
     """

@@ -1,4 +1,4 @@
-"""Whether a model is linear, as the exact Kalman filter needs."""
+"""A check that a model is linear, as the exact Kalman filter needs."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from jaxveh.statespace import StateDependent, StateSpace
 
 
 def concrete_values():
-    """Inside jit, too, a model may be made of plain numbers, and be computed with. Outside, it would only have constants compiled
-    one by one."""
+    """A context in which a model of plain numbers has concrete values inside jit, too. Outside jit it does nothing:
+    there it would only compile constants one by one."""
     inside = not is_concrete(jnp.zeros(()))
     return jax.ensure_compile_time_eval() if inside else contextlib.nullcontext()
 
 
 def check_linear(who: str, model: StateSpace) -> None:
-    """Raise `InputError` naming the first value that is no linear function of the state.
+    """Raise `InputError` with the name of the first state or channel that is not a linear function of the state.
 
-    Each function is compared with its tangent at ten times the prior's spread, for inputs of 0 and of 1; where it is not
-    finite there is nothing to compare. Noise that depends on the state is none of a linear model; of the inputs it may.
-    Tracers pass.
+    Each function is compared with its tangent at ten times the prior's standard deviations, for inputs of 0 and of 1;
+    values that are not finite are not compared. In a linear model the noise may depend on the inputs, but not on the
+    state. Tracers pass.
     """
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
@@ -40,14 +40,16 @@ def check_linear(who: str, model: StateSpace) -> None:
         ):
             if np.any(values):
                 name = names[int(np.argmax(values))]
-                raise InputError(f"{who}: {what} {name} is no linear function of the state. Use Extended or Unscented.")
+                raise InputError(
+                    f"{who}: {what} {name} is not a linear function of the state. Use Extended or Unscented."
+                )
     if varies:
         raise InputError(
             f"{who}: the measurement noise depends on the state. Use Extended, Unscented or a particle filter."
         )
 
 
-# Compiled: operation by operation it would take longer than filtering a short recording.
+# Compiled: without jit it would take longer than filtering a short recording.
 @eqx.filter_jit
 def _nonlinear_parts(model: StateSpace):
     """Which states and which channels are nonlinear, (n,) and (m,), for inputs of 0 and for inputs of 1."""
@@ -56,7 +58,7 @@ def _nonlinear_parts(model: StateSpace):
 
 @eqx.filter_jit
 def _noise_varies(model: StateSpace):
-    """Whether the covariance of the measurement noise is another at another state, for inputs of 0 or of 1."""
+    """Whether the covariance of the measurement noise changes with the state, for inputs of 0 or of 1."""
     start, step = _start_and_step(model)
     kind, t = type(model.prior.mean), jnp.zeros((), start.dtype)
     changed = []
@@ -90,8 +92,8 @@ def _is_nonlinear(f, model: StateSpace):
 
 
 def _start_and_step(model: StateSpace):
-    """The prior's mean, and a step of ten of its spreads."""
+    """The prior's mean, and a step of ten of its standard deviations."""
     start = jnp.stack(model.prior.mean)
     reach = 10.0 * jnp.sqrt(jnp.diagonal(model.prior.covariance()))
-    # One direction of mixed signs, which no sum of squares or products survives by chance.
+    # One direction of mixed signs, along which a sum of squares or products does not look linear by chance.
     return start, reach * jnp.asarray(np.cos(1.0 + 2.0 * np.arange(len(start))), start.dtype)

@@ -1,4 +1,4 @@
-"""The noises' laws as matrices in the order of given fields."""
+"""Covariances and factors of noise laws, in the order of given fields."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from jaxveh.statespace import AbstractNoise, Gaussian, Row, StateDependent, Stat
 
 
 def law_at(model: StateSpace, row: Row, mean: Callable[[], Any]) -> AbstractNoise:
-    """The law of the measurement noise in a row; where it depends on the state, at the state `mean()`."""
+    """The law of the measurement noise in a row; if it depends on the state, it is taken at the state `mean()`."""
     if isinstance(model.measurement_noise, StateDependent):
         return model.measurement_law(row.t, mean(), row.u)
     return model.measurement_noise
 
 
 def covariance_in(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:
-    """A law's covariance in the order of `fields`, with zeros for fields that carry no noise: (n, n)."""
+    """A law's covariance in the order of `fields`, with zeros for fields without noise: (n, n)."""
     if isinstance(law, Gaussian):
         std = law.std._asdict()
         variances = jnp.stack([std[name] ** 2 if name in std else jnp.zeros((), dtype) for name in fields])
@@ -30,7 +30,7 @@ def covariance_in(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:
 
 
 def factor_in(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:
-    """A factor N (n, q) of that covariance, N N^T, with a column for each of the q fields that carry noise."""
+    """A factor N (n, q) of the law's covariance N N^T, with one column for each of the q fields with noise."""
     embed = _embedding_matrix(law, fields, dtype)
     if isinstance(law, Gaussian):
         return embed * jnp.stack(law.std)

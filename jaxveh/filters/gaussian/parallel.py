@@ -1,4 +1,5 @@
-"""Kalman filter and smoother as associative scans: all rows at once, in a time that grows with the logarithm of their number."""
+"""Kalman filter and smoother as associative scans over all rows at once; the time grows with the logarithm of the
+number of rows."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ from jaxveh.statespace import Row, StateSpace, kit
 
 
 class Lines(NamedTuple):
-    """A function of the state in every row as a line with an error: `slope` (T, m, n), `offset` (T, m), `error` (T, m, m)."""
+    """Linear approximations with errors of a function of the state, one per row: `slope` (T, m, n), `offset` (T, m),
+    covariance `error` (T, m, m)."""
 
     slope: Any
     offset: Any
@@ -37,7 +39,7 @@ class Filtering(NamedTuple):
 
 
 class SmoothingElement(NamedTuple):
-    """p(x_k | x_j, y_0..j) = N(E x_j + g, L) of an earlier row k and a later row j, with (T, ...) leaves."""
+    """p(x_k | x_j, y_0..j) = N(E x_j + g, L) for an earlier row k and a later row j, with (T, ...) leaves."""
 
     E: Any
     g: Any
@@ -45,8 +47,8 @@ class SmoothingElement(NamedTuple):
 
 
 class Passed(NamedTuple):
-    """Means (T, n) and covariances (T, n, n) of all rows: predicted, filtered, smoothed; the means `about` which (T, n) they
-    were linearised; and the observation's lines."""
+    """Means (T, n) and covariances (T, n, n) of all rows: predicted, filtered, smoothed; the means `about` (T, n) at
+    which the model was linearised; and the `lines` of the observation."""
 
     predicted: tuple[Any, Any]
     filtered: tuple[Any, Any]
@@ -64,7 +66,7 @@ def pass_over(rule: AbstractRule, model: StateSpace, rows: Row, means: Any, cova
     about = means
     y, R = _measurements(model, rows, about)
     if model.angles:
-        # A measured angle is the one of all its turns that is nearest to where its line was laid.
+        # A measured angle is taken in the turn that is nearest to the linearised prediction.
         seen = jnp.einsum("tmn,tn->tm", sees.slope, means) + sees.offset
         y = seen + wrapped_innovation(model, (y - seen).T, jnp.ones((*y.shape[1:], 1), bool)).T
     R = R + sees.error
@@ -83,7 +85,7 @@ def pass_over(rule: AbstractRule, model: StateSpace, rows: Row, means: Any, cova
 
 
 def _lines(rule, model, rows: Row, means, covariances) -> tuple[Lines, Lines]:
-    """The transitions' lines (T - 1) with process noise as part of the error, and the observations' (T)."""
+    """The lines of the transitions (T - 1), whose errors include the process noise, and those of the observations (T)."""
 
     def belief(row, mean, covariance):
         factor = numerics.cholesky(covariance)
@@ -112,8 +114,8 @@ def _line(image, belief) -> Lines:
 
 
 def _measurements(model, rows: Row, means):
-    """Measurements (T, m), zero where missing, and noise covariances (T, m, m), of unit variance there; those of noise that
-    depends on the state at the `means` (T, n)."""
+    """Measurements (T, m), zero where missing, and noise covariances (T, m, m), of unit variance where missing. Noise
+    that depends on the state is taken at the `means` (T, n)."""
     kind = type(model.prior.mean)
 
     def of(row, mean):
@@ -150,7 +152,7 @@ def _filtering_elements(moves: Lines, sees: Lines, y, R, prior) -> Filtering:
 
 
 def _join_filtering(i: Filtering, j: Filtering) -> Filtering:
-    """Of an earlier element i and a later element j (eq 15 and lemma 8 of the paper)."""
+    """Join an earlier element i and a later element j (eq 15 and lemma 8 of the paper)."""
     eye = jnp.eye(i.C.shape[0], dtype=i.C.dtype)
     forward = jnp.linalg.solve((eye + i.C @ j.J).T, j.A.T).T
     backward = jnp.linalg.solve((eye + j.J @ i.C).T, i.A).T
@@ -173,12 +175,12 @@ def _smoothing_element(move: Lines, m, P, m_next, P_next) -> SmoothingElement:
 
 
 def _join_smoothing(j: SmoothingElement, i: SmoothingElement) -> SmoothingElement:
-    """Of a later element j and an earlier element i, in the order of a reversed scan."""
+    """Join a later element j and an earlier element i, in the order of a reversed scan."""
     return SmoothingElement(i.E @ j.E, i.E @ j.g + i.g, i.E @ j.L @ i.E.T + i.L)
 
 
 def info_of(model: StateSpace, rows: Row, passed: Passed) -> Any:
-    """The info (T,) of all rows: what the predictions said of the measurements."""
+    """The info (T,) of all rows: the measurements beside their predictions."""
     y, R = _measurements(model, rows, passed.about)
 
     def of(row, y, R, mean, covariance, line):

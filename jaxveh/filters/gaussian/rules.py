@@ -1,4 +1,4 @@
-"""How a function of a Gaussian is approximated: by its slopes at the mean, or by its values at sigma points."""
+"""Rules that approximate a function of a Gaussian: by its slopes at the mean, or by its values at sigma points."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from jaxveh.numerics import as_whole, fence, sigma_points
 class Image(NamedTuple):
     """A function's values under a Gaussian, as deviations whose products are covariances.
 
-    `mean` (m,); `deviations` E (m, k) and those of the argument, `spread` X (n, k), such that with the signs W of the rule's
-    weights (k,), None where all are positive,
+    `mean` (m,); `deviations` E (m, k) of the values; `spread` X (n, k), the deviations of the argument. With `signs` W
+    (k,) of the rule's weights (None if all are positive):
 
         cov(y) = E W E^T,    cov(x, y) = X W E^T,    P = X W X^T.
     """
@@ -30,12 +30,12 @@ class Image(NamedTuple):
 
 
 class AbstractRule(eqx.Module):
-    """`image(f, mean, factor)`: what becomes of the Gaussian with this mean (n,) and P = F F^T, F = `factor` (n, n).
+    """A rule for `image(f, mean, factor)`, the image of the Gaussian with this mean (n,) and P = F F^T, F = `factor` (n, n).
 
-    `f` takes the coordinates as rows (n, ...) to values as rows (m, ...), elementwise in what follows the first axis.
+    `f` maps coordinates as rows (n, ...) to values as rows (m, ...), elementwise along the axes after the first.
     """
 
-    # Not an `eqx.AbstractVar`: under postponed annotations that would be a field of the dataclass.
+    # Not an `eqx.AbstractVar`: with postponed annotations that would be a field of the dataclass.
     @property
     @abc.abstractmethod
     def positive(self) -> bool:
@@ -43,12 +43,12 @@ class AbstractRule(eqx.Module):
 
     @property
     def amplification(self) -> float:
-        """How many times its own size a mean loses to rounding, as weights of both signs cancel."""
+        """The factor by which rounding errors of a mean grow because weights of both signs cancel."""
         return 1.0
 
     @abc.abstractmethod
     def image(self, f: Callable, mean: Any, factor: Any) -> Image:
-        """The function's mean and deviations."""
+        """The mean and the deviations of the function `f`."""
 
 
 class Slopes(AbstractRule):
@@ -66,7 +66,7 @@ class Slopes(AbstractRule):
 class Points(AbstractRule):
     """Sigma points `mean + F xi_j`, with E_j = sqrt|w_j| (f_j - mean f) (S. Sarkka, 2013, eq 5.84).
 
-    Two of equal numbers are equal, so that jit sees one structure.
+    Two rules with equal numbers are equal, so that jit sees one structure.
     """
 
     points: sigma_points.SigmaPoints = eqx.field(static=True)
@@ -94,10 +94,10 @@ class Points(AbstractRule):
 
 
 def times(a: Any, b: Any) -> Any:
-    """The matrix product (n, k) (k, m) or (n, k) (k,) as a sum that XLA fuses.
+    """The matrix product (n, k) (k, m) or (n, k) (k,) as a sum that XLA can fuse.
 
-    Its library's products round differently with the place of the operands in memory, so that a live loop would not give
-    the scan's bits; for few states they are slower, too.
+    The matrix products of XLA's library round differently depending on where the operands lie in memory, so that a live
+    loop would not give the bits of a scan. For few states they are also slower.
     """
     return jnp.sum(a * b, axis=-1) if b.ndim == 1 else jnp.sum(a[:, None, :] * b.T[None], axis=-1)
 
@@ -111,5 +111,5 @@ def spread_of(image: Image) -> Any:
 
 
 def product(a: Any, b: Any, signs: np.ndarray | None) -> Any:
-    """A W B^T (n, m) of deviations A (n, k) and B (m, k) and the signs W."""
+    """The product A W B^T (n, m) of deviations A (n, k) and B (m, k) with the signs W."""
     return times(a if signs is None else a * jnp.asarray(signs, a.dtype), b.T)

@@ -1,4 +1,4 @@
-"""What all filters around Gaussian filters have in common."""
+"""The common base of wrappers of Gaussian filters."""
 
 from typing import ClassVar
 
@@ -9,9 +9,9 @@ from jaxveh.statespace import AbstractWrapper
 
 
 class AbstractGaussianWrapper(AbstractGaussianFilter, AbstractWrapper):
-    """A Gaussian filter around another, `inner`: a subclass writes what it does otherwise than that."""
+    """A Gaussian filter around another, `inner`: a subclass defines only its differences from `inner`."""
 
-    # No postponed annotations in this file: they would make fields of it and of class variables.
+    # No postponed annotations in this file: they would turn this and class variables into fields.
     inner: eqx.AbstractVar[AbstractGaussianFilter]
     written_out: ClassVar[bool] = True
 
@@ -23,7 +23,7 @@ class AbstractGaussianWrapper(AbstractGaussianFilter, AbstractWrapper):
 
 
 class AbstractStateless(AbstractGaussianWrapper):
-    """A filter around another, `inner`, that remembers nothing: its belief is that of its filter."""
+    """A filter around another, `inner`, without a state of its own: its belief is that of `inner`."""
 
     noise_by_row: ClassVar[bool] = True
 

@@ -1,4 +1,4 @@
-"""Smoothers: what all rows say of each."""
+"""Smoothers: the estimate of each row given all rows."""
 
 from jaxveh.filters.smoothing.backward_sampling import BackwardSampling
 from jaxveh.filters.smoothing.driver import smooth

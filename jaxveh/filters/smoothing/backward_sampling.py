@@ -16,8 +16,8 @@ from jaxveh.statespace import Row, StateSpace, kit
 
 
 class BackwardSampling(AbstractPathSmoother):
-    """Paths drawn backwards from the smoothing distribution, `trajectories` of them: for particle filters whose every state
-    carries process noise."""
+    """Draws `trajectories` paths backwards from the smoothing distribution, for particle filters whose states all have
+    process noise."""
 
     trajectories: int = eqx.field(static=True, default=200)
 
@@ -32,12 +32,12 @@ class BackwardSampling(AbstractPathSmoother):
 
 
 def check_density(model: StateSpace) -> None:
-    """Raise `InputError` naming the states without process noise, whose transition has no density."""
+    """Raise `InputError` if the transition has no density; it names the states without process noise."""
     names = () if model.process_noise is None else model.process_noise.law.names
     still = [name for name in model.states if name not in names]
     if still:
         raise InputError(
-            f"BackwardSampling needs process noise on every state; none is on {', '.join(still)}. Use Genealogy()."
+            f"BackwardSampling needs process noise on every state; without it: {', '.join(still)}. Use Genealogy()."
         )
 
 
@@ -45,10 +45,11 @@ def check_density(model: StateSpace) -> None:
 def sample_backwards(filter: AbstractParticleFilter, model: StateSpace, rows: Row, key, count: int) -> SmoothedEstimate:
     """`count` paths over rows with (T,) leaves, from the smoothing distribution (S. Godsill, A. Doucet & M. West 2004).
 
-    The last row's states by their weights; then each row's by weight times the transition's density to the state after it.
+    The states of the last row are drawn by their weights, then those of each earlier row by weight times the
+    transition's density to the drawn state after it.
     """
     noise = model.process_noise
-    assert noise is not None  # `check_density` has seen to it
+    assert noise is not None  # `check_density` ensures it
     forward_key, last_key, back_key = jax.random.split(key, 3)
     filtered, kept = kit.scan_and_keep(filter, model, rows, forward_key, lambda b: (b.particles, b.weights))
     particles, weights = kept

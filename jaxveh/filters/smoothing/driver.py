@@ -1,4 +1,4 @@
-"""Smoothing a recording: one function for every filter."""
+"""Smoothing of a recording: one function for all filters."""
 
 from __future__ import annotations
 
@@ -28,15 +28,16 @@ def smooth(
     lag: int | None = None,
     throw: bool = True,
 ) -> SmoothedEstimate:
-    """Each row's state given the whole recording, or the rows up to `lag` behind it: the filter forwards, its smoother back.
+    """Estimate each row's state given the whole recording, or given the rows up to `lag` rows later.
 
-    **Arguments**: as `run`. A Gaussian filter gets the Rauch-Tung-Striebel smoother of its own rule and form; a particle filter
-    `method`, by default `BackwardSampling()` where every state carries process noise, else `Genealogy()`.
+    The filter runs forwards, then its smoother backwards. **Arguments**: as `run`. A Gaussian filter has the
+    Rauch-Tung-Striebel smoother of its own rule and form. A particle filter has `method`, by default
+    `BackwardSampling()` if every state has process noise, otherwise `Genealogy()`.
 
-    Gradients with respect to array leaves of `model` work for Gaussian filters.
+    Gaussian smoothers are differentiable with respect to array leaves of `model`.
 
-    **Raises** as `run`, and `InputError` for a method that does not go with filter or model, and for a filter whose class does
-    not declare that it can be smoothed (`AbstractFilter.smooths`).
+    **Raises** as `run`, and `InputError` if the method does not suit the filter or the model, or if the filter's class
+    does not declare that it can be smoothed (`AbstractFilter.smooths`).
     """
     kit.check_told(filter, model)
     filter.check(model)
@@ -45,13 +46,13 @@ def smooth(
     if lag is not None:
         check_lag(filter, lag)
         if method is not None:
-            raise InputError("smooth: a lag has a method of its own; give one of both.")
+            raise InputError("smooth: a lag has a method of its own; give either lag or method.")
         found = smooth_with_lag(filter, model, rows, key, lag)
     elif kind is Smoothing.particles:
         found = _particles(filter, model, rows, kit.key_for(filter, key), method)
     elif method is not None:
         raise InputError(
-            f"method = {type(method).__name__}: is for particle filters; {type(filter).__name__} has its own."
+            f"method = {type(method).__name__}: is for particle filters; {type(filter).__name__} has a smoother of its own."
         )
     else:
         found = rauch_tung_striebel(filter, model, rows)

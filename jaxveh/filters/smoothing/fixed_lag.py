@@ -1,4 +1,4 @@
-"""Each row given those up to a lag behind it: live, or over a recording."""
+"""Fixed-lag smoothing: each row given the rows up to a lag after it, live or over a recording."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from jaxveh.statespace import AbstractFilter, AbstractWrapper, Gradient, Row, Sm
 
 
 class LaggedBelief(AbstractOuterBelief):
-    """The newest belief `inside`; the last beliefs as one with (lag + 1, ...) leaves, oldest first, in `past`; and what the
-    report says of the oldest, given the newest: `shown`, mean and standard deviation."""
+    """The newest belief `inside`; `past`: the last beliefs as one with (lag + 1, ...) leaves, oldest first; `shown`:
+    mean and standard deviation of the report of the oldest, given all rows up to the newest."""
 
     inside: Any
     past: Any
@@ -31,13 +31,13 @@ class LaggedBelief(AbstractOuterBelief):
 
 
 class FixedLag(AbstractWrapper):
-    """`inner`, whose estimate is that of the row `lag` rows back, given all up to now; in the first rows, of the first.
+    """`inner`, whose estimate is that of the row `lag` rows back given all rows so far; in the first rows, of the first row.
 
-    A live smoother of constant memory: for what may come late, by `lag` rows, and should be good. Gaussian filters go back by
-    their own Rauch-Tung-Striebel steps, particle filters by their ancestors (G. Kitagawa 1996), whose lines are still many over
-    a short lag. The info is that of the filter. A step costs `lag` steps back.
+    A live smoother of constant memory, for estimates that may be `lag` rows late but should be more accurate. Gaussian
+    filters go back by their own Rauch-Tung-Striebel steps, particle filters by their ancestors (G. Kitagawa 1996), of
+    which there are still many over a short lag. The info is that of the filter. A step costs `lag` backward steps.
 
-    `smooth(filter, model, recording, lag=...)` does the same with each row's estimate in its own place.
+    `smooth(filter, model, recording, lag=...)` does the same and puts each row's estimate at its own time.
     """
 
     noise_by_row: ClassVar[bool] = True
@@ -63,13 +63,13 @@ class FixedLag(AbstractWrapper):
         inside, info = self.inner._step(model, belief.inside, row)
         longer = lambda past, new: jnp.concatenate([past[1:], new[None]])
         past = jax.tree.map(longer, belief.past, inside)
-        # Before there are so many rows the oldest are copies of the first.
+        # Until there are lag + 1 rows, the oldest beliefs are copies of the first.
         real = jnp.arange(self.lag, dtype=jnp.int32) >= self.lag + 1 - inside.count
         return LaggedBelief(inside, past, first_of(self.inner, model, past, real)), info
 
 
 def check_lag(filter: Any, lag: int) -> None:
-    """Raise `InputError` for a lag that is no whole number of at least 1, or a filter without a smoother."""
+    """Raise `InputError` unless the lag is a whole number of at least 1 and the filter has a smoother."""
     check_whole("lag", lag)
     kind = kit.check_smooths("FixedLag", filter)
     if kind is Smoothing.particles:
@@ -77,9 +77,9 @@ def check_lag(filter: Any, lag: int) -> None:
 
 
 def first_of(filter: Any, model: StateSpace, past: Any, real: Any) -> tuple[Any, Any]:
-    """Mean and spread of the report of the first of `past` beliefs, (L + 1, ...) leaves, given the last.
+    """Mean and standard deviation of the report of the first of the `past` beliefs, leaves (L + 1, ...), given the last.
 
-    A belief that is not `real` (L,) is passed over: it is a copy of the one after it.
+    A belief that is not `real` (L,) is skipped: it is a copy of the one after it.
     """
     if kit.smoothing_of(filter) is Smoothing.particles:
         return _trace_ancestors(model, past, real)
@@ -97,7 +97,7 @@ def first_of(filter: Any, model: StateSpace, past: Any, real: Any) -> tuple[Any,
 
 
 def _trace_ancestors(model: StateSpace, past: ParticleBelief, real: Any) -> tuple[Any, Any]:
-    """The same by the ancestors of the last particles."""
+    """The result of `first_of` by the ancestors of the last particles."""
     weights = past.weights[-1]
     lines = jnp.arange(weights.shape[0], dtype=past.ancestors.dtype)
 
@@ -113,12 +113,12 @@ def _trace_ancestors(model: StateSpace, past: ParticleBelief, real: Any) -> tupl
 
 @eqx.filter_jit
 def smooth_with_lag(filter: Any, model: StateSpace, rows: Row, key, lag: int) -> SmoothedEstimate:
-    """Each row given those up to `lag` rows behind it, over rows with (T,) leaves."""
+    """The estimate of each row given the rows up to `lag` rows later; `rows` has (T,) leaves."""
     filtered, beliefs = kit.scan_and_keep(filter, model, rows, key, lambda belief: belief)
     count = rows.t.shape[0]
 
     def window(k):
-        # Behind the end stand copies of the last row, which say nothing more of the ones before.
+        # After the end there are copies of the last row, which are not counted.
         place = jnp.minimum(k + jnp.arange(lag + 1), count - 1)
         past = jax.tree.map(lambda leaf: leaf[place], beliefs)
         return first_of(filter, model, past, k + jnp.arange(lag) < count - 1)

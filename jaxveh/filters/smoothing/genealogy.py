@@ -1,4 +1,4 @@
-"""The ancestors of the last particles: the smoother that a particle filter has for nothing."""
+"""The ancestors of the last particles: a smoother without additional computation."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from jaxveh.statespace import Row, StateSpace, kit
 
 
 class Genealogy(AbstractPathSmoother):
-    """The ancestors of the last particles: for any particle filter whose scheme keeps them, good for some ten rows before the
-    end."""
+    """Follows the ancestors of the last particles, for any particle filter whose scheme keeps them; good for about ten
+    rows before the end."""
 
     def check(self, filter, model):
         check_ancestors("Genealogy", kit.innermost(filter).resampling, "Use BackwardSampling().")
@@ -28,8 +28,8 @@ class Genealogy(AbstractPathSmoother):
 def trace_genealogy(filter: AbstractParticleFilter, model: StateSpace, rows: Row, key) -> SmoothedEstimate:
     """The paths of the particles alive in the last row, over rows with (T,) leaves (G. Kitagawa 1996; Sarkka 2013, sec. 11.1).
 
-    Every path has the weight of its end. Going back they fall together: some hundred rows before the end few distinct
-    ancestors are left, and the spreads say too little.
+    Every path has the weight of its last particle. Going back, the paths merge: some hundred rows before the end few
+    distinct ancestors are left, and standard deviations are too small.
     """
     filtered, (particles, ancestors) = kit.scan_and_keep(filter, model, rows, key, lambda b: (b.particles, b.ancestors))
     weights = filtered.belief.weights

@@ -20,31 +20,32 @@ from jaxveh.statespace import Estimate, Row, Smoothing, StateSpace, kit, paramet
 def smooth_parallel(
     filter: AbstractGaussianFilter, model: StateSpace, recording: Recording, *, throw: bool = True
 ) -> SmoothedEstimate:
-    """What `smooth` says, by associative scans over the rows: for accelerators, and for long linear problems on many cores.
+    """The result of `smooth` by associative scans over the rows: for accelerators, and for long linear problems on many cores.
 
-    `Kalman()`: exact, as in a loop (S. Sarkka & A. Garcia-Fernandez 2021). `Iterated(filter, n)`: n passes, each linearising
-    every row by the filter's rule about the smoothed path of the last (F. Yaghoobi, A. Corenflos, S. Hassan & S. Sarkka 2021);
-    the first about the prior. It converges to the fixed point of iterated smoothing, which no loop forwards gives; where the
-    prior is far away it may not. The filtered estimate and the log-likelihood are those of the last pass's lines.
+    `Kalman()`: exact, as in a loop (S. Sarkka & A. Garcia-Fernandez 2021). `Iterated(filter, n)`: n passes, each of
+    which linearises every row by the filter's rule at the smoothed path of the pass before (F. Yaghoobi, A. Corenflos,
+    S. Hassan & S. Sarkka 2021), the first at the prior. It converges to the fixed point of iterated smoothing, which a
+    forward loop does not reach; if the prior is far away it may not converge. The filtered estimate and the
+    log-likelihood are those of the last pass's linearised model.
 
-    A measured angle is taken as the one of all its turns that is nearest to where it is linearised; `Kalman`, which is
-    linearised nowhere, takes no angles.
+    A measured angle is taken in the turn that is nearest to the point of linearisation; `Kalman`, which has no such
+    point, takes no angles.
 
-    On a processor with few cores the loop is faster: about twice the work a row is done, in matrix products.
+    On a processor with few cores the loop is faster: here each row takes about twice the work, in matrix products.
 
-    **Raises** as `run`, and `InputError` for filters that do not declare it (`linearisations`) and forms without
-    the covariance itself.
+    **Raises** as `run`, and `InputError` for filters that do not support it (`linearisations` is None) and forms that
+    do not store the covariance.
     """
     declared = kit.smoothing_of(filter) is Smoothing.gaussian
     if not declared or filter.linearisations is None or not kit.innermost(filter).form.keeps_matrix:
         raise InputError(
-            f"smooth_parallel: {type(filter).__name__}: must be Kalman() or Iterated(...) itself, of the form Covariance()."
+            f"smooth_parallel: {type(filter).__name__}: must be Kalman() or Iterated(...), not wrapped, with Covariance()."
         )
     filter.check(model)
     if model.angles and filter.linearisations == 0:
         raise InputError(
             f"smooth_parallel: {type(filter).__name__} with the angle(s) {', '.join(model.angles)}: innovations are "
-            "wrapped, which is no linear update. Use Iterated(Extended(), 2), or smooth."
+            "wrapped, which is not a linear update. Use Iterated(Extended(), 2), or smooth."
         )
     found = _smooth(filter, model, model.rows(recording))
     found = eqx.tree_at(lambda e: (e.time, e.filtered.time), found, (recording.time, recording.time))
@@ -62,7 +63,7 @@ def _smooth(filter, model, rows: Row) -> SmoothedEstimate:
     def again(path, _):
         return pass_over(rule, model, rows, *path).smoothed, None
 
-    # The last pass is below.
+    # The last pass follows below.
     path, _ = jax.lax.scan(jax.checkpoint(again), path, length=max(filter.linearisations - 1, 0))
     passed = pass_over(rule, model, rows, *path)
     info = info_of(model, rows, passed)

@@ -1,4 +1,4 @@
-"""What a smoother of particle filters is."""
+"""The base of smoothers for particle filters."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from jaxveh.statespace import Row, StateSpace
 
 
 class AbstractPathSmoother(eqx.Module):
-    """How a particle filter is smoothed: the `method` of `smooth`."""
+    """A smoother for particle filters: the `method` of `smooth`."""
 
     @abc.abstractmethod
     def check(self, filter: AbstractParticleFilter, model: StateSpace) -> None:
-        """Raise `InputError` early, by name, where filter or model has not what this needs."""
+        """Raise `InputError` if the filter or the model does not meet this smoother's needs."""
 
     @abc.abstractmethod
     def smooth(self, filter: AbstractParticleFilter, model: StateSpace, rows: Row, key: Any) -> SmoothedEstimate:
-        """Paths over rows with (T,) leaves, and what they say of each."""
+        """Paths over rows with (T,) leaves, and the estimate of each row from them."""

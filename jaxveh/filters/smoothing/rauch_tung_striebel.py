@@ -1,4 +1,4 @@
-"""Backwards through what a Gaussian filter found: each belief given all rows."""
+"""The Rauch-Tung-Striebel smoother: backwards through a Gaussian filter's beliefs, each given all rows."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def rauch_tung_striebel(filter: AbstractGaussianFilter, model: StateSpace, rows:
 def _smoothed_in_form(
     filter: AbstractGaussianFilter, model: StateSpace, rows: Row, steps: kit.Steps
 ) -> SmoothedEstimate:
-    """The same by steps of a kind."""
-    # Between two scans in scalars a batch's matrices would be put together and taken apart again: 64 unscented smoothers of three
-    # states take 0.29 instead of 1.2 us a run-step without that (jax 0.10; 0.088 instead of 0.105 with 0.12).
+    """The result of `rauch_tung_striebel` with `steps` of one form."""
+    # Between two scans in scalars, a batch's matrices would be assembled and taken apart again. Without that, 64 unscented
+    # smoothers of three states take 0.29 instead of 1.2 us per run and step (jax 0.10; 0.088 instead of 0.105 with 0.12).
     in_scalars = steps in (kit.Steps.written_out, kit.Steps.complete)
     kept = numerics.as_entries if in_scalars else lambda belief: belief
     filtered, beliefs = kit.scan_in_form(filter, model, rows, None, kept, kit.SHOWN, steps)
@@ -49,9 +49,9 @@ def _smoothed_in_form(
 def given_later(
     filter: AbstractGaussianFilter, model: StateSpace, belief: Any, t: Any, u: Any, later: GaussianBelief
 ) -> GaussianBelief:
-    """The Gaussian of a belief, given the smoothed one `later` at the next row's time `t` with the inputs `u`.
+    """The Gaussian of a belief, given the smoothed Gaussian `later` at the next row's time `t` with the inputs `u`.
 
-    Of a wrapped filter with the process noise that it held for true then.
+    For a wrapped filter, the process noise is the one that it had estimated at that row.
     """
     own, gaussian = filter.adapted_model(model, belief), gaussian_of(belief)
     image = transition_image(own, gaussian, t, u)

@@ -1,4 +1,4 @@
-"""What a smoother made of a recording."""
+"""The estimate of a smoother."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from jaxveh.statespace import Estimate, StateSpace, parameters_of
 
 
 class SmoothedEstimate(Estimated, eqx.Module):
-    """Each row's quantities given all rows, or those up to a lag behind it.
+    """The estimate of each row given all rows, or given the rows up to a lag after it.
 
     `time` (T,); `mean`, `std`: NamedTuples of the model's report with (T,) in each field; `parameters`, `parameters_std` as in
     `Estimate`; `filtered`: the filter's `Estimate`, with log-likelihood, info and result. `trajectories`: draws of whole
-    paths, the state's NamedTuple with (T, M) in each field, and their `weights` (M,) (particle smoothers, else None).
+    paths, the state's NamedTuple with (T, M) in each field, and their `weights` (M,) (particle smoothers, otherwise None).
     """
 
     by_row = ("mean", "std", "parameters", "parameters_std", "trajectories")
@@ -59,12 +59,12 @@ class SmoothedEstimate(Estimated, eqx.Module):
 def smoothed_estimate(
     model: StateSpace, filtered: Estimate, moments: Any, trajectories: Any = None, weights: Any = None
 ) -> SmoothedEstimate:
-    """The estimate of `moments`: mean and std of the report, (T,) leaves."""
+    """The estimate with these `moments`: mean and standard deviation of the report, (T,) leaves."""
     mean, std = moments
     show = lambda report: parameters_of(model, report)
     return SmoothedEstimate(filtered.time, mean, std, show(mean), show(std), filtered, trajectories, weights)
 
 
 def with_last(rows: Any, last: Any) -> Any:
-    """The tree of (T-1, ...) leaves with the last row's values behind them."""
+    """The tree `rows` of (T-1, ...) leaves with the values `last` of the last row appended."""
     return jax.tree.map(lambda values, end: jnp.concatenate([values, end[None]]), rows, last)

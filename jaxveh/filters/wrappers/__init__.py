@@ -1,4 +1,4 @@
-"""Filters around filters: noises learned, outliers borne, sensors gated and shared out, models that change."""
+"""Filters around filters: estimated noises, outliers, gated sensors, federated filters, models that change."""
 
 from jaxveh.filters.wrappers.considered import Consider, Dual
 from jaxveh.filters.wrappers.contaminated import Contaminated

@@ -1,4 +1,4 @@
-"""What wrappers around Gaussian filters have in common."""
+"""Bases of wrappers around Gaussian filters that have a memory."""
 
 import abc
 from typing import Any, ClassVar
@@ -14,18 +14,18 @@ from jaxveh.statespace import Gaussian, Info, Row, StateSpace, kit
 
 
 class Remembering(AbstractTransparentBelief):
-    """The belief of the filter `inside`, and what the wrapper remembers: `memory`, a tree of arrays."""
+    """The belief of the filter `inside`, and the wrapper's own state, `memory`, a tree of arrays."""
 
     inside: Any
     memory: Any
 
     def inflate(self, factor):
-        """The belief with `factor` times its covariance."""
+        """The belief with its covariance multiplied by `factor`."""
         return Remembering(self.inside.inflate(factor), self.memory)
 
 
 class AbstractRemembering(AbstractGaussianWrapper):
-    """A filter around another that remembers what it has seen, and gives its filter a model with other noises."""
+    """A filter around another with a memory of the rows so far, by which it changes the noises of the inner filter's model."""
 
     @abc.abstractmethod
     def start(self, model: StateSpace) -> Any:
@@ -33,7 +33,7 @@ class AbstractRemembering(AbstractGaussianWrapper):
 
     @abc.abstractmethod
     def believed_model(self, model: StateSpace, memory: Any) -> StateSpace:
-        """The model with the noises that the memory says."""
+        """The model with the noises that follow from the memory."""
 
     def prior(self, model, row):
         memory = self.start(model)
@@ -50,14 +50,14 @@ class AbstractRemembering(AbstractGaussianWrapper):
         return self.inner.adapted_model(self.believed_model(model, belief.memory), belief.inside)
 
     def update_inside(self, model: StateSpace, belief: Remembering, row: Row) -> tuple[Remembering, Info]:
-        """The filter's own update with the noises that the memory says."""
+        """The inner filter's update with the noises that follow from the memory."""
         after, info = self.inner.update(self.believed_model(model, belief.memory), belief.inside, row)
         return Remembering(after, belief.memory), info
 
 
 class AbstractLearnedNoise(AbstractRemembering):
-    """A filter around another that learns the variances of its sensors. Their noise must be Gaussian, a standard deviation a
-    channel."""
+    """A filter around another that estimates the variances of the measurement noise, which must be Gaussian with one
+    standard deviation per channel."""
 
     rows_between: ClassVar[bool] = True
 
@@ -81,11 +81,11 @@ def with_gaussian(belief: Any, gaussian: GaussianBelief) -> Any:
 
 
 def check_independent(who: str, model: StateSpace) -> None:
-    """Raise `InputError` unless the measurement noise is one standard deviation a channel."""
-    kit.check_fixed(who, model.measurement_noise, "Take the filter inside by itself, or a particle filter.")
+    """Raise `InputError` unless the measurement noise is Gaussian with one standard deviation per channel."""
+    kit.check_fixed(who, model.measurement_noise, "Use the inner filter without this wrapper, or a particle filter.")
     if not isinstance(model.measurement_noise, Gaussian):
         kind = type(model.measurement_noise).__name__
-        raise InputError(f"{who}: the measurement noise is {kind}: must be Gaussian, a standard deviation a channel.")
+        raise InputError(f"{who}: the measurement noise is {kind}: must be Gaussian, a standard deviation per channel.")
 
 
 def variances_of(model: StateSpace) -> Any:
@@ -94,6 +94,6 @@ def variances_of(model: StateSpace) -> Any:
 
 
 def with_variances(model: StateSpace, variances: Any) -> StateSpace:
-    """The model with these variances (m,) of its measurement noise."""
+    """The model with these variances (m,) of the measurement noise."""
     kind = type(model.measurement_noise.std)
     return eqx.tree_at(lambda m: m.measurement_noise.std, model, kind(*jnp.sqrt(variances)))

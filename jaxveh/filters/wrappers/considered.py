@@ -1,4 +1,4 @@
-"""States whose uncertainty counts, but which are not estimated; and states estimated apart from each other."""
+"""States that are considered but not estimated, and blocks of states that are estimated separately."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from jaxveh.statespace import Smoothing, StateSpace
 
 
 class Consider(AbstractStateless):
-    """`inner`, whose updates leave the states `names` as they are (S. F. Schmidt 1966: the consider filter).
+    """`inner`, whose updates leave the states `names` unchanged (S. F. Schmidt 1966: the consider filter).
 
-    Their mean and covariance stay those of the prediction; how the others depend on them is kept, so that the others' spreads
-    say what not knowing them costs:
+    Their mean and covariance stay those of the prediction. Their cross-covariances with the other states are kept, so
+    that the standard deviations of the others include the uncertainty of the considered states:
 
         K of the considered rows = 0,    P_cc+ = P_cc-
 
-    For parameters that the data cannot tell, such as a mass on a level road.
+    It is for parameters that the data do not determine, such as the mass on a level road.
     """
 
     rows_between: ClassVar[bool] = True
@@ -47,12 +47,12 @@ class Consider(AbstractStateless):
 
 
 class Dual(AbstractStateless):
-    """`inner` of a joint model, with states and parameters estimated apart: dual estimation (E. Wan & A. Nelson 2001).
+    """`inner` of a joint model, with states and parameters estimated separately: dual estimation (E. Wan & A. Nelson 2001).
 
-    After every row the covariances between the blocks of `groups` (tuples of states; one for the rest is added) are forgotten, so
-    that each block is corrected by what a measurement says through this step's prediction alone. By default the blocks are the
-    model's own states and its chosen parameters. What the blocks say of each other over several rows is lost, and spreads come
-    out too small: the joint filter, without this wrapper, is better wherever it is stable.
+    After every row the covariances between the blocks of `groups` (tuples of states; a block of the remaining states is added)
+    are set to zero, so that a measurement corrects each block only through the covariances of this step's prediction. By default
+    the blocks are the model's own states and its chosen parameters. Correlations that build up between blocks over several rows
+    are lost, and standard deviations are too small: the joint filter, without this wrapper, is better wherever it is stable.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
@@ -67,7 +67,7 @@ class Dual(AbstractStateless):
             check_names("Dual.groups", group, model.states)
         names = [name for group in self._blocks(model) for name in group]
         if len(set(names)) < len(names):
-            raise InputError("Dual.groups: a state stands in more than one group.")
+            raise InputError("Dual.groups: a state is in more than one group.")
         self.inner.check(model)
 
     def update(self, model, belief, row):

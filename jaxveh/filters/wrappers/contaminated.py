@@ -1,4 +1,4 @@
-"""Measurements of which a share is wild: each case of who is wild and who is not, weighed by how well it explains the row."""
+"""Measurements with a share of outliers: every combination of outlying channels, weighted by how well it explains the row."""
 
 from __future__ import annotations
 
@@ -19,22 +19,23 @@ from jaxveh.filters.wrappers.interacting import mixed_covariance
 from jaxveh.statespace import Info, Smoothing
 
 MOST_CHANNELS = 6
-"""Of which 64 cases are made."""
+"""The largest number of channels: 64 cases."""
 
 
 class Contaminated(AbstractStateless):
-    """`inner` for noise of which a `share` is `factor` times as wide, channel by channel (J. Tukey's law, 1960):
+    """`inner` for noise of which a `share` has `factor` times the standard deviation, channel by channel (J. Tukey's law, 1960):
 
         e ~ (1 - share) N(0, sigma^2) + share N(0, factor^2 sigma^2)
 
-    Which of a row's m channels are wild is one of 2^m cases, in each of which the row is an ordinary update; the belief after is
-    the Gaussian with the moments of their mixture (G. Ackerson & K. Fu 1970). Where `Gated` decides, this one weighs, and a
-    row's log-likelihood is a density of what was measured: share and factor can be chosen by it, or fitted, as arrays that
-    gradients reach. NIS is NaN, a mixture has none. At most six channels. The noise must be Gaussian, a standard deviation a
-    channel. Not around a filter that learns variances: inside it.
+    Which of a row's m channels are outliers is one of 2^m cases, and in each case the row is an ordinary update. The
+    belief after the row is the Gaussian with the moments of their mixture (G. Ackerson & K. Fu 1970). `Gated` decides
+    for one case; this wrapper weights all, and the log-likelihood of a row is a density of the measurement, so that
+    share and factor can be chosen by it, or fitted: they are arrays with gradients. NIS is NaN, as a mixture has none.
+    There may be at most six channels. The noise must be Gaussian, with one standard deviation per channel. A filter
+    that estimates variances goes outside this one, not inside.
 
-    **Raises** `InputError` for a share that is not between 0 and 1, a factor that is not above 1, too many channels, and around
-    another wrapper.
+    **Raises** `InputError` for a share that is not between 0 and 1, a factor that is not above 1, too many channels, or
+    another wrapper as `inner`.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
@@ -79,7 +80,8 @@ def _by_case(after: GaussianBelief, info: Info) -> tuple[Any, Any, Info]:
 
 
 def _info(every_info: Info, probabilities: Any, log_likelihood: Any) -> Info:
-    """One info of those of every case, whose innovation is the same; `probabilities` (r,) of cases before the row is seen."""
+    """One info from those of all cases, which have the same innovation; `probabilities` (r,): those of the cases before
+    the row."""
     spread = lambda std: jnp.sqrt(jnp.sum(probabilities * jnp.square(std)))
     nothing = jnp.full_like(log_likelihood, jnp.nan)
     return Info(

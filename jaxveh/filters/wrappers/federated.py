@@ -1,4 +1,4 @@
-"""Local filters, each with sensors of its own, and a master that fuses them."""
+"""Local filters, each with its own sensors, and a master filter that fuses them."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from jaxveh.statespace import AbstractProcessNoise, AbstractWrapper, Gradient, R
 
 
 class FederatedBelief(AbstractTransparentBelief):
-    """The master, a Gaussian, `inside`; the `locals`; their `shares` (k,) of the information; and how they fared: `alarm` (k,),
-    the fading mean of NIS over its expected value."""
+    """The Gaussian of the master, `inside`; those of the local filters, `locals`; their `shares` (k,) of the
+    information; and `alarm` (k,), the fading mean of the NIS of their sensors over its expected value."""
 
     inside: GaussianBelief
     locals: tuple[GaussianBelief, ...]
@@ -32,30 +32,31 @@ class FederatedBelief(AbstractTransparentBelief):
 
 
 class Federated(AbstractWrapper):
-    """N. Carlson's federated filter (IEEE Trans. Aerospace and Electronic Systems 26, 1990) with `locals` of the same `inner`.
+    """N. Carlson's federated filter (IEEE Trans. Aerospace and Electronic Systems 26, 1990) with local filters of the
+    same `inner`.
 
-    Every local has all states, the sensors of its own `groups` entry (tuples of channels), the prior's and the process noise's
-    covariance over its share, and so no information that another has:
+    Every local filter has all states, the sensors of its own entry of `groups` (tuples of channels), and the
+    covariances of the prior and of the process noise divided by its share, so that no information is used twice:
 
         P^-1 = sum P_i^-1,    x = P sum P_i^-1 x_i;    reset:  x_i = x, P_i = P / share_i
 
-    With `reset` (fusion-reset) on linear models this is the centralised filter; without, the locals go on by themselves, more
-    robust and less sharp.
+    With `reset` (fusion-reset) this is the centralised filter on linear models. Without it, the local filters continue
+    from their own estimates, which is more robust and less accurate.
 
-    With `common` no local is given a share: each has the whole prediction, and what all have in common counts once in the fusion
-    (H. Hashemipour, S. Roy & A. Laub, IEEE Trans. Automatic Control 33, 1988):
+    With `common` there are no shares: each local filter has the whole prediction, and this common information counts
+    once in the fusion (H. Hashemipour, S. Roy & A. Laub, IEEE Trans. Automatic Control 33, 1988):
 
         P^-1 = P_-^-1 + sum (P_i^-1 - P_-^-1),    x = P (P_-^-1 x_- + sum (P_i^-1 x_i - P_-^-1 x_-))
 
-    On linear models that is the same again. On others it is nearer to the centralised filter, since points over a share lie
-    sqrt(1 / share) times as far out as they should.
+    On linear models the result is the same. On nonlinear models it is nearer to the centralised filter: with shares,
+    sigma points lie sqrt(1 / share) times too far out.
 
-    `shares`: fixed, by default equal; `by_trace`: in proportion to 1 / trace(P_i), over the prior's
-    variances. `isolate`: what locals measure whose fading mean NIS exceeds this multiple of its expected value is left out of
-    the fusion until it falls again (None: never); it is still watched.
+    `shares`: fixed, by default equal; `by_trace`: shares in proportion to 1 / trace(P_i), with variances divided by
+    those of the prior. `isolate`: the measurements of a local filter are left out of the fusion while the fading mean
+    of their NIS exceeds this multiple of its expected value (None: never); the mean is still updated.
 
-    Groups that share a channel count its information twice: `InputError`, unless `overlapping`. The info is that of the fused
-    prediction with all sensors.
+    Groups that share a channel count its information twice and raise `InputError`, unless `overlapping`. The info is
+    that of the fused prediction with all sensors.
     """
 
     whitens: ClassVar[bool] = True
@@ -97,7 +98,7 @@ class Federated(AbstractWrapper):
             fine = abs(sum(self.shares) - 1) < 1e-9 and min(self.shares) > 0
             check("Federated.shares", self.shares, lambda _: fine, "positive, with the sum 1")
         if self.common and (not self.reset or self.shares is not None or self.by_trace):
-            raise InputError("Federated.common: locals that share a prediction have no shares, and are reset.")
+            raise InputError("Federated.common: shares and by_trace must not be given with it, and reset must be True.")
         check("Federated.isolate", self.isolate, lambda v: v > 1, "above 1")
         check("Federated.forgetting", self.forgetting, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
 
@@ -121,7 +122,7 @@ class Federated(AbstractWrapper):
         if self.common:
             predicted = self.inner.predict_between(model, belief.inside, row.t, row.u)
             return self._update_locals(model, belief, predicted, self._hand_out(predicted, belief.shares), row)
-        # All locals by one program: they differ in numbers alone.
+        # One program for all local filters: they differ only in numbers.
         before = self._hand_out(belief.inside, belief.shares) if self.reset else _together(belief.locals)
 
         def ahead(local, share):
@@ -131,14 +132,14 @@ class Federated(AbstractWrapper):
         return self._update_locals(model, belief, self._fuse(alone, belief.inside), alone, row)
 
     def _hand_out(self, master: GaussianBelief, shares) -> GaussianBelief:
-        """The locals, one behind the other along the first axis of each array."""
+        """The beliefs of the local filters, stacked along the first axis of each array."""
         return jax.vmap(lambda share: master.inflate(1.0 if self.common else 1.0 / share))(shares)
 
     def _update_locals(self, model, belief: FederatedBelief, predicted: GaussianBelief, ahead: GaussianBelief, row):
         rows = _together([_only(model, row, group).y for group in self.groups])
         own = lambda local, y: self.inner.update(model, local, row._replace(y=y))
         found, _ = jax.vmap(own)(ahead, rows)
-        # A local's own prediction is wide, and seldom surprised: sensors are judged by the fused one.
+        # The prediction of a local filter is wide, so that its NIS is seldom large: sensors are judged by the fused prediction.
         every = jax.tree.map(lambda one, some: jnp.concatenate([one[None], some]), row.y, rows)
         every_info = jax.vmap(lambda y: own(predicted, y)[1])(every)
         info, surprise = jax.tree.map(lambda leaf: leaf[0], every_info), every_info.nis[1:]
@@ -146,7 +147,7 @@ class Federated(AbstractWrapper):
         ratio = surprise / jnp.maximum(counts, 1.0)
         alarm = jnp.where(counts > 0, self.forgetting * belief.alarm + (1.0 - self.forgetting) * ratio, belief.alarm)
         trusted = jnp.ones(len(self.groups), bool) if self.isolate is None else alarm < self.isolate
-        # Where every local is suspect there is nothing to judge by.
+        # If all local filters are suspect, none can be judged by the others, and all are used.
         trusted = trusted | ~jnp.any(trusted)
         believed = jax.vmap(_either)(trusted, found, ahead)
         master = self._fuse(believed, belief.inside, predicted if self.common else None)
@@ -169,7 +170,8 @@ class Federated(AbstractWrapper):
     def _fuse(
         self, beliefs: GaussianBelief, like: GaussianBelief, common: GaussianBelief | None = None
     ) -> GaussianBelief:
-        """The Gaussian of all beliefs' information, with the time and inputs of `like`; what is `common` to all counts once."""
+        """The Gaussian of all beliefs' information, with the time and inputs of `like`; the information `common` to all
+        counts once."""
         informations, pulls = jax.vmap(self._information)(beliefs)
         information, pull = jnp.sum(informations, axis=0), jnp.sum(pulls, axis=0)
         if common is not None:
@@ -181,14 +183,14 @@ class Federated(AbstractWrapper):
         return with_spread(like, mean, self.inner.form.start(numerics.inverse_psd(factor)), t=beliefs.t[0])
 
     def _information(self, belief: GaussianBelief) -> tuple[Any, Any]:
-        """P^-1 (n, n) and P^-1 x (n,)."""
+        """The information P^-1 (n, n) and P^-1 x (n,)."""
         triangular = self.inner.form.triangular
         information = numerics.inverse_psd(belief.factor if triangular else numerics.lower_factor(belief.factor))
         return information, times(information, belief.vector)
 
 
 def _together(trees: Sequence[Any]) -> Any:
-    """Trees of one structure as one, each array behind the other along a new first axis."""
+    """Trees of one structure as one tree, with arrays stacked along a new first axis."""
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)
 
 

@@ -1,4 +1,4 @@
-"""Measurements that no prediction expects are left out, channel by channel."""
+"""Measurements far from their prediction are left out, channel by channel."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from jaxveh.statespace import Smoothing
 
 
 class Gated(AbstractStateless):
-    """`inner`, to which a channel is missing where its innovation exceeds `limit` standard deviations of the prediction.
+    """`inner`, for which a channel counts as missing if its innovation exceeds `limit` standard deviations of the innovation.
 
-    One sensor's fault leaves the others in use (Y. Bar-Shalom, X. Li & T. Kirubarajan, Estimation with Applications to Tracking
-    and Navigation, sec. 5.4: validation). A filter that is wrong gates what could set it right: keep the limit wide, 3 to 5, and
-    look at how often each channel is left out; `info.innovation` is NaN there.
+    If one sensor fails, the others are still used (Y. Bar-Shalom, X. Li & T. Kirubarajan, Estimation with Applications
+    to Tracking and Navigation, sec. 5.4: validation). A filter with a wrong estimate rejects the measurements that could correct
+    it: keep the limit wide, 3 to 5, and check how often each channel is left out; `info.innovation` is NaN there.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian

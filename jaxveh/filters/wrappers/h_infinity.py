@@ -1,4 +1,4 @@
-"""The worst case instead of the mean square."""
+"""The H-infinity filter: it bounds the worst case instead of the mean square error."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from jaxveh.filters.gaussian.wrapper import AbstractStateless
 
 
 class HInfinity(AbstractStateless):
-    """`inner` that bounds the worst ratio of the estimate's error to all disturbances by 1 / `bound` (D. Simon, Optimal State
-    Estimation, 2006, eq 11.89).
+    """`inner` with a bound of 1 / `bound` on the worst ratio of the estimate's error to all disturbances (D. Simon,
+    Optimal State Estimation, 2006, eq 11.89).
 
         P~ = (P^-1 - bound S)^-1,    then the Kalman update with P~
 
-    S has 1 / scale^2 of each state in `scales` on its diagonal: what of the error is to be small, and its unit. Noises are no
-    laws here but weights of disturbances. A larger bound trusts measurements more; beyond what is possible P~ is not positive
-    definite, and the result says so (Simon's condition counts the row's own information, too, and is a little weaker). With
-    bound 0 it is the Kalman filter. Log-likelihoods are those of the wider prediction.
+    S has on its diagonal 1 / scale^2 of each state in `scales`: the states whose error is to be small, each with the scale of
+    its error. Noise covariances are here weights of disturbances, not distributions. A larger bound trusts measurements more; if
+    it is too large, P~ is not positive definite, and the result code shows it (Simon's condition includes the row's own
+    information and is a little weaker). With bound 0 it is the Kalman filter. Log-likelihoods are those of the wider prediction.
     """
 
     inner: AbstractRuleFilter
@@ -48,6 +48,6 @@ class HInfinity(AbstractStateless):
         information = information - jnp.diag(self.bound.astype(dtype) * weights)
         wider = numerics.inverse_psd(numerics.cholesky(information))
         after, info = self.inner.update(model, with_spread(belief, belief.vector, self.inner.form.start(wider)), row)
-        # What the bound has made of a finite covariance is no divergence of the model.
+        # A finite covariance that the bound made infinite is not a divergence of the model.
         too_large = jnp.all(jnp.isfinite(belief.factor)) & ~jnp.all(jnp.isfinite(wider))
         return after, info._replace(result=jnp.where(too_large, code(Result.not_positive_definite), info.result))

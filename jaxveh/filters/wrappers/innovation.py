@@ -1,4 +1,4 @@
-"""What a row says against its prediction, before anything is believed of it."""
+"""A row's innovation and its variances, before the update."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from jaxveh.statespace import Row, StateSpace, kit
 
 
 class Innovation(NamedTuple):
-    """By channel, (m,): the `error` of the prediction (zero where missing), the prediction's own variance `expected`, that of
-    the measurement noise `noise`, and whether the channel is `here`."""
+    """By channel, (m,): the innovation `error` (zero where missing), the variance `expected` of the prediction, the
+    variance `noise` of the measurement noise, and whether the channel is `here`."""
 
     error: Any
     expected: Any
@@ -23,7 +23,7 @@ class Innovation(NamedTuple):
 
 
 def innovation(filter: AbstractGaussianFilter, model: StateSpace, belief: Any, row: Row) -> Innovation:
-    """What `row` says against the belief before it."""
+    """The innovation of `row` under the belief before it."""
     image = filter.observe(model, belief, row)
     measured, present = kit.presence(model, row)
     here = jnp.stack([present[name] for name in model.channels])

@@ -1,4 +1,4 @@
-"""Several models at once: which one the car is in is estimated, too."""
+"""The interacting multiple model filter: it also estimates which of several models holds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from jaxveh.statespace import AbstractBelief, AbstractWrapper, Gradient, Info, S
 
 
 class MixtureBelief(AbstractBelief):
-    """One Gaussian a mode, `modes`, and the modes' `probabilities` (r,)."""
+    """One Gaussian per mode, `modes`, and the `probabilities` (r,) of the modes."""
 
     modes: tuple[GaussianBelief, ...]
     probabilities: jax.Array
@@ -37,22 +37,22 @@ class MixtureBelief(AbstractBelief):
 
     @property
     def count(self):
-        """Rows so far."""
+        """The number of rows so far."""
         return self.modes[0].count
 
     @property
     def mean(self):
-        """The mixture's mean, the state's NamedTuple."""
+        """The mixture's mean, as the state's NamedTuple."""
         return _mixture_moments(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[0]
 
     @property
     def std(self):
-        """The mixture's standard deviations, the state's NamedTuple."""
+        """The mixture's standard deviations, as the state's NamedTuple."""
         return _mixture_moments(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[1]
 
     @property
     def covariance(self):
-        """(n, n) of the mixture, in the order of the state's fields."""
+        """The covariance (n, n) of the mixture, in the order of the state's fields."""
         return _of_modes(self.probabilities, self.modes)[1]
 
     def sample(self, key, draws):
@@ -63,19 +63,21 @@ class MixtureBelief(AbstractBelief):
         return jax.tree.map(lambda *fields: jnp.stack(fields)[chosen, jnp.arange(draws)], *drawn)
 
     def moments(self, model):
-        # A mode's own model reports its state: what differs are parameters, and the report is of states.
+        # One model makes the report for all modes: modes differ in parameters, and the report is a function of the states.
         return _mixture_moments(self.probabilities, [mode.moments(model) for mode in self.modes])
 
 
 class InteractingModels(AbstractWrapper):
     """The interacting multiple model filter (H. Blom & Y. Bar-Shalom 1988; Bar-Shalom, Li & Kirubarajan, sec. 11.6.6).
 
-    **Arguments**: `inner`, of the family that all modes share; `variants`: functions from the model to each mode's model, such
-    as `lambda model: eqx.tree_at(where_friction, model, 0.3)`, which must keep states and channels; `transition` (r, r): row i
-    has the probabilities of going from mode i to each within a step; `start` (r,): probabilities before the first row (equal).
+    **Arguments**: `inner`: the Gaussian filter that all modes use; `variants`: functions from the model to each mode's
+    model, such as `lambda model: eqx.tree_at(where_friction, model, 0.3)`, which must keep states and channels;
+    `transition` (r, r): row i has the probabilities of changing from mode i to each mode in a step; `start` (r,):
+    probabilities before the first row (default: equal).
 
-    Each step mixes the modes' Gaussians by the probabilities of having come from each other, moves every one by its own model,
-    and weighs them by their likelihoods. `belief.probabilities` are those after the last row. Innovations are the mixture's.
+    In each step, every mode starts from a mixture of the modes' Gaussians, weighted by the probabilities of having come
+    from each mode; it is propagated by its own model, and its probability is weighted by its likelihood.
+    `belief.probabilities` are those after the last row. Innovations are the mixture's.
     """
 
     has_covariance: ClassVar[bool] = True
@@ -119,7 +121,7 @@ class InteractingModels(AbstractWrapper):
     def _step(self, model, belief, row):
         joint = self.transition.astype(row.t.dtype) * belief.probabilities[:, None]
         ahead = jnp.sum(joint, axis=0)
-        # A mode that cannot be is not mixed: it goes on from its own Gaussian, and counts for nothing.
+        # A mode of probability zero is not mixed: it continues from its own Gaussian, with zero weight.
         alone = jnp.eye(len(self.variants), dtype=joint.dtype)
         from_each = jnp.where(ahead > 0, joint / jnp.where(ahead > 0, ahead, 1), alone)
         found = []
@@ -132,7 +134,7 @@ class InteractingModels(AbstractWrapper):
         return [variant(model) for variant in self.variants]
 
     def _mix(self, belief: MixtureBelief, weights, j: int) -> GaussianBelief:
-        """The Gaussian with the mixture's moments, for mode j."""
+        """The Gaussian with the moments of the mixture from which mode j starts."""
         mean, covariance = _of_modes(weights, belief.modes)
         return with_spread(belief.modes[j], mean, self.inner.form.start(covariance))
 
@@ -156,13 +158,13 @@ def mixed_covariance(weights: Any, vectors: Any, covariances: Any) -> tuple[Any,
 
 
 def _of_modes(weights, modes):
-    """Mean (n,) and covariance (n, n) of these Gaussians' mixture."""
+    """Mean (n,) and covariance (n, n) of the mixture of the Gaussians `modes`."""
     stacked = lambda values: jnp.stack(list(values))
     return mixed_covariance(weights, stacked(mode.vector for mode in modes), stacked(mode.covariance for mode in modes))
 
 
 def _mixture_moments(weights, moments):
-    """Mean and standard deviation, NamedTuples, of a mixture of such pairs."""
+    """Mean and standard deviation, as NamedTuples, of a mixture; `moments`: the (mean, standard deviation) of each part."""
     means, stds = zip(*moments, strict=True)
     mean = jax.tree.map(lambda *values: sum(w * v for w, v in zip(weights, values, strict=True)), *means)
 

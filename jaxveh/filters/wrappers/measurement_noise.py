@@ -1,4 +1,4 @@
-"""Measurement noise learned on the way."""
+"""Measurement noise that is estimated along with the state."""
 
 from __future__ import annotations
 
@@ -22,13 +22,14 @@ from jaxveh.statespace import Smoothing
 
 
 class SageHusa(AbstractLearnedNoise):
-    """`inner` with measurement variances by matching the innovations' (A. Sage & G. Husa 1969, in fading form).
+    """`inner` with measurement variances that match those of the innovations (A. Sage & G. Husa 1969, in fading form).
 
         R <- (1 - d) R + d (e^2 - H P H^T),    d = (1 - b) / (1 - b^(k+1)),    b = `forgetting`
 
-    channel by channel, of the rows where it is present, kept between `floor` and `ceiling` times the model's own variance: the
-    difference may be negative. A row is judged with the variances learned before it, so that likelihood and NIS stay
-    predictions. Errors of the model count as noise of the sensor. The noise must be Gaussian, a standard deviation a channel.
+    channel by channel, over the rows in which it is present, and limited to `floor` and `ceiling` times the model's own
+    variance, because the difference may be negative. A row is filtered with the variances estimated before it, so that
+    likelihood and NIS are predictions. Model errors are taken for sensor noise. The noise must be Gaussian, with one
+    standard deviation per channel.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
@@ -63,23 +64,23 @@ class SageHusa(AbstractLearnedNoise):
 
 
 class Precisions(NamedTuple):
-    """Inverse-gamma laws of the variances (m,): `shape` (-) and `scale` (the channel's unit squared). 1 / E[1 / variance] is
-    scale / shape."""
+    """The inverse-gamma laws of the variances (m,): `shape` (-) and `scale` (the channel's unit squared);
+    1 / E[1 / variance] is scale / shape."""
 
     shape: Any
     scale: Any
 
 
 class VariationalBayes(AbstractLearnedNoise):
-    """`inner` with measurement variances as unknowns of inverse-gamma laws (S. Sarkka & A. Nummenmaa 2009).
+    """`inner` with measurement variances as unknowns with inverse-gamma laws (S. Sarkka & A. Nummenmaa 2009).
 
-    Between rows the laws forget: shape and scale times `forgetting`, so that 1 / (1 - forgetting) rows are remembered. In a row
-    the state, given the variances scale / shape, and the variances, given the state, are found in turns:
+    Between rows, shape and scale are multiplied by `forgetting`, so that the laws are based on about 1 / (1 - forgetting) rows.
+    In a row, the state given the variances scale / shape and the variances given the state are computed in turns:
 
         shape <- shape + 1/2,    scale <- scale + E[(y - h)^2] / 2
 
-    `weight`: how many rows the model's own variances are worth at first. The noise must be Gaussian, a standard deviation a
-    channel.
+    `weight`: the number of rows that the model's own variances count for at first. The noise must be Gaussian, with one
+    standard deviation per channel.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian

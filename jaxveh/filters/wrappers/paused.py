@@ -1,4 +1,4 @@
-"""A filter that waits while its model does not hold."""
+"""A filter that is paused while its model does not hold."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from jaxveh.statespace import AbstractWrapper, Gradient, StateSpace, kit
 
 
 class Paused(AbstractWrapper):
-    """`inner`, held while the input `channel` is above 0.5: no prediction, no measurement, as estimators of mass and
-    grade wait while braking.
+    """`inner`, paused while the input `channel` is above 0.5: no prediction and no update, as for estimators of mass
+    and grade while braking.
 
-    The channel holds from its row to the next, whatever the model's `input_path`: the time before a pause's first row is still
-    predicted, that before the first row after it is not. Meanwhile the state, and what a wrapped filter remembers, stay. In the
-    first row after a pause the spread grows by `widen`, standard deviations by state: what may have happened (`{"v_x": 20.0}`:
-    whatever it was, the next measurement says it anew). The info of a row in a pause has a log-likelihood of zero and no
-    innovation.
+    The channel's value holds from its row to the next, whatever the model's `input_path`: the step to the first row of
+    a pause is still predicted, the step to the first row after it is not. During a pause the state and the memory of a
+    wrapped filter do not change. In the first row after a pause, the covariance grows by `widen`, standard deviations
+    by state, for the changes during the pause (`{"v_x": 20.0}`: large enough that the next measurement determines the
+    speed anew). The info of a row in a pause has a log-likelihood of zero and no innovation.
     """
 
     whitens: ClassVar[bool] = True
@@ -70,7 +70,7 @@ class Paused(AbstractWrapper):
         return getattr(u, self.channel) > 0.5
 
     def _silent(self, model, row):
-        """The row, without measurements while paused."""
+        """The row; while paused, all its measurements are missing."""
         return row._replace(y=jax.tree.map(lambda value: jnp.where(self._waits(row.u), jnp.nan, value), row.y))
 
     def _widen(self, model: StateSpace, belief: Any) -> Any:
@@ -81,14 +81,14 @@ class Paused(AbstractWrapper):
 
 
 def _at(belief: Any, **where: Any) -> Any:
-    """The same belief at another time `t`, with other inputs `u` or another `count`."""
+    """The belief with another time `t`, other inputs `u` or another `count`."""
     gaussian = gaussian_of(belief)
     spread = Spread(gaussian.factor, gaussian.matrix)
     return with_gaussian(belief, with_spread(gaussian, gaussian.vector, spread, **where))
 
 
 def _after(belief: Any, row: Any) -> Any:
-    """The belief after a row of which nothing is taken."""
+    """The belief after a row without an update."""
     return _at(belief, t=row.t, u=row.u, count=gaussian_of(belief).count + 1)
 
 

@@ -1,4 +1,4 @@
-"""Process noise that is large at first, and shrinks as the state settles."""
+"""Extra process noise that shrinks as the state settles, or that follows the corrections."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from jaxveh.statespace import AbstractNoise, AbstractProcessNoise, Gaussian, Mul
 
 
 class ShrinkingProcess(AbstractRemembering):
-    """`inner` with an extra process noise a step on some states, which shrinks: as an adaptive unscented filter of mass and
-    road grade has it (the experiment `mass-grade-aukf`).
+    """`inner` with an extra process noise per step on some states, which shrinks, as in an adaptive unscented filter of
+    mass and road grade (the experiment `mass-grade-aukf`).
 
-    The variance of a state is q_c + q_v: the model's own, and q_v, at first the square of `extra` (standard deviations a step
-    by state). With d the change of the state's mean in the last row (eq 24)
+    The variance of a state is q_c + q_v: the model's own, and q_v, at first the square of `extra` (standard deviations
+    per step, by state). With d the change of the state's mean in the last row (eq 24)
 
         q_v <- lambda q_v,    lambda = |q_v - (d^2 + q_v) / 2| / (q_v + d^2)
 
     Errata: the paper's rate of the mass is read as d^2, so that units agree; its eq 25, which scales the covariance in every step
-    and freezes the mass, is left out. Then lambda is at most 1/2: **the extra noise at least halves with each row whatever the
-    data say**, and it all amounts to an honest, large prior (measured: final mass 2.46 against 2.35 %). For noise that follows
-    the data take `MatchedProcess`.
+    and freezes the mass, is left out. Then lambda is at most 1/2: **the extra noise at least halves with each row,
+    whatever the data**, so that the method is equivalent to a large prior (measured: final mass 2.46 against 2.35 %).
+    For noise that follows the data, use `MatchedProcess`.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
@@ -56,7 +56,7 @@ class ShrinkingProcess(AbstractRemembering):
     def update(self, model, belief, row):
         after, info = self.update_inside(model, belief, row)
         d, q = _squared_changes(belief.inside, after.inside, self.extra), belief.memory
-        # The extra noise may have shrunk to nothing.
+        # The extra noise may have shrunk to zero.
         total = jnp.where(q + d > 0, q + d, 1.0)
         return Remembering(after.inside, q * jnp.abs(q - 0.5 * (d + q)) / total), info
 
@@ -67,9 +67,9 @@ class MatchedProcess(AbstractRemembering):
 
         q <- b q + (1 - b) (d^2 - Q),    b = `forgetting`
 
-    with d what a row's measurement changed in the state's mean, whose mean square is all of a steady filter's process noise,
-    and Q the model's own variance over the step; the extra variance a step is q, from zero up to the square of `most` (standard
-    deviations a step by state). It grows in a manoeuvre that the model does not explain and falls again.
+    with d the change of the state's mean by a row's measurement, whose mean square equals the process noise in a steady filter,
+    and Q the model's own variance over the step. The extra variance per step is q, from zero up to the square of `most`
+    (standard deviations per step, by state). It grows in a manoeuvre that the model does not explain, and falls again.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
@@ -91,7 +91,7 @@ class MatchedProcess(AbstractRemembering):
 
     def start(self, model):
         nothing = jnp.zeros(len(self.most), model.prior.mean[0].dtype)
-        # How far the corrections are above the model's own variances, and these over the last step.
+        # The excess of the squared corrections over the model's own variances, and these variances over the last step.
         return nothing, nothing
 
     def believed_model(self, model, memory):
@@ -114,7 +114,7 @@ class MatchedProcess(AbstractRemembering):
         excess, own = belief.memory
         learned = self.forgetting * excess + (1.0 - self.forgetting) * (d - own)
         learned = jnp.minimum(learned, self._most(d.dtype))
-        # Nothing is learned of the first row, whose correction is the prior's.
+        # The first row is not used: its correction comes from the prior.
         return Remembering(after.inside, (jnp.where(belief.count > 0, learned, excess), own)), info
 
     def _most(self, dtype):
@@ -123,7 +123,7 @@ class MatchedProcess(AbstractRemembering):
 
 def _check_levels(what: str, levels: tuple[tuple[str, float], ...]) -> None:
     if not levels:
-        raise InputError(f"{what} is empty: give the standard deviation a step of at least one state.")
+        raise InputError(f"{what} is empty: give the standard deviation per step of at least one state.")
     for name, std in levels:
         check_positive(f"{what} of {name}", std)
 
@@ -133,12 +133,12 @@ def _check_states(what: str, levels: tuple[tuple[str, float], ...], model: State
 
 
 def _squared_changes(before: Any, after: Any, levels: tuple[tuple[str, float], ...]) -> Any:
-    """How much the means of the named states moved from one belief to another, squared (k,)."""
+    """The squared changes (k,) of the means of the named states from one belief to the other."""
     return jnp.square(jnp.stack([getattr(after.mean, name) - getattr(before.mean, name) for name, _ in levels]))
 
 
 def with_extra(model: StateSpace, variances: Mapping[str, Any]) -> StateSpace:
-    """The model with these variances a step more on some states."""
+    """The model with these additional variances per step on some states."""
     extra = Extra(model.process_noise, _gaussian(variances))
     return eqx.tree_at(lambda m: m.process_noise, model, extra, is_leaf=lambda x: x is None)
 
@@ -170,7 +170,7 @@ class Extra(AbstractProcessNoise):
 
 
 def _gaussian(variances: Mapping[str, Any]) -> Gaussian:
-    """A Gaussian of these variances; one may be zero, which a law given by a user must not."""
+    """A Gaussian with these variances; they may be zero, unlike those of a law that a user gives."""
     stds = {name: numerics.sqrt(variance) for name, variance in variances.items()}
     unit = Gaussian(dict.fromkeys(stds, 1.0))
     return eqx.tree_at(lambda law: law.std, unit, type(unit.std)(*stds.values()))

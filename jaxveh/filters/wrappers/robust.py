@@ -1,4 +1,4 @@
-"""Measurements with outliers: the noise counts for larger where a residual is."""
+"""Measurements with outliers: the noise is taken to be larger where a residual is larger."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from jaxveh.statespace import Smoothing, kit
 
 
 class AbstractReweighting(AbstractStateless):
-    """A filter around another that takes each row's noise for larger where a residual is. The noise must be Gaussian, a standard
-    deviation a channel."""
+    """A filter around another that takes a row's noise to be larger where a residual is larger. The noise must be
+    Gaussian, with one standard deviation per channel."""
 
     rows_between: ClassVar[bool] = True
 
@@ -35,12 +35,12 @@ class AbstractReweighting(AbstractStateless):
 
 
 class Huber(AbstractReweighting):
-    """`inner` with Huber's loss of the innovations: linear beyond `threshold` standard deviations of the prediction.
+    """`inner` with Huber's loss of the innovations, linear beyond `threshold` standard deviations of the innovation.
 
-    Each channel's noise variance is divided by the weight `min(1, threshold / |e|)`, e the innovation over its predicted
-    spread (P. Huber 1964; after the reweighting of C. Karlgaard & H. Schaub 2007, who scale by the noise's spread and repeat).
-    The log-likelihood is that of the Gaussian with the larger variances: no density of Huber's law. The noise must be Gaussian,
-    a standard deviation a channel. Not around a filter that learns variances: inside it.
+    Each channel's noise variance is divided by `min(1, threshold / |e|)`, with e the innovation over its predicted standard
+    deviation (P. Huber 1964; after C. Karlgaard & H. Schaub 2007, who scale by that of the noise and iterate). The log-likelihood
+    is that of the Gaussian with the larger variances, not the density of Huber's law. The noise must be Gaussian, with one
+    standard deviation per channel. A filter that estimates variances goes outside this one, not inside.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
@@ -61,13 +61,13 @@ class Huber(AbstractReweighting):
 class RobustStudentT(AbstractReweighting):
     """`inner` for noise of Student's t law with `dof` degrees of freedom and the model's standard deviations as scales.
 
-    A t law is a Gaussian whose precision is itself random; variational Bayes finds the precision and the state in turns, with
-    y - h the residual under the state's belief and H P H^T what it spreads (R. Piche, S. Sarkka & J. Hartikainen 2012):
+    A t law is a Gaussian with a random precision. Variational Bayes computes the precision and the state in turns, with
+    E[(y - h)^2] the squared residual plus the variance H P H^T of the belief (R. Piche, S. Sarkka & J. Hartikainen 2012):
 
         variance / scale^2 = (dof + E[(y - h)^2] / scale^2) / (dof + 1)
 
-    Each channel is judged by itself. The log-likelihood is that of the Gaussian with the last variances: no density of the
-    t law. The noise must be Gaussian, a standard deviation a channel.
+    Each channel has its own precision. The log-likelihood is that of the Gaussian with the last variances, not the
+    density of the t law. The noise must be Gaussian, with one standard deviation per channel.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
@@ -92,7 +92,7 @@ class RobustStudentT(AbstractReweighting):
 
 
 def expected_squares(filter: AbstractGaussianFilter, model: Any, belief: Any, row: Any) -> Any:
-    """E[(y - h)^2] (m,) under a belief after the row: the residual's square, and what the belief spreads."""
+    """E[(y - h)^2] (m,) under a belief after the row: the squared residual plus the belief's variance of h."""
     image = filter.observe(model, belief, row)
     measured, present = kit.presence(model, row)
     here = jnp.stack([present[name] for name in model.channels])

@@ -1,4 +1,4 @@
-"""A fading factor where the innovations are larger than the filter expects."""
+"""The strong tracking filter: a fading factor where innovations are larger than the filter predicts."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from jaxveh.filters.wrappers.innovation import innovation
 
 
 class StrongTracking(AbstractRemembering):
-    """`inner` whose predicted covariance is inflated where innovations exceed it (D. Zhou & P. Frank 1996).
+    """`inner`, whose predicted covariance is inflated when innovations are too large for it (D. Zhou & P. Frank 1996).
 
         V <- (rho V + e e^T) / (1 + rho),    lambda = max(1, trace(V - beta R) / trace(H P H^T))
 
-    with V = e e^T in a channel's first row, and each channel over its noise's standard deviation, so that units do not matter;
-    rho = `forgetting`, beta = `softening`, lambda at most `ceiling`. All of the predicted covariance is inflated, where the
-    source leaves out the process noise. It follows sudden changes that the model does not know of, and takes outliers for such.
+    with V = e e^T in a channel's first row, and each channel divided by the standard deviation of its noise, so that
+    units do not matter; rho = `forgetting`, beta = `softening`, lambda at most `ceiling`. The whole predicted
+    covariance is inflated, whereas the source does not inflate the process noise. The filter follows sudden changes
+    that the model does not describe, and also outliers.
     """
 
     noise_by_row: ClassVar[bool] = True
@@ -37,7 +38,7 @@ class StrongTracking(AbstractRemembering):
 
     def start(self, model):
         dtype = model.prior.mean[0].dtype
-        # V over the noise; negative before a channel's first row.
+        # V divided by the noise variance; negative before a channel's first row.
         return jnp.full(len(model.channels), -1.0, dtype)
 
     def believed_model(self, model, memory):

@@ -1,4 +1,4 @@
-"""Noise that a channel of the recording tells: a receiver's own accuracy, a road's roughness."""
+"""Noise whose standard deviation is a channel of the recording, such as a receiver's accuracy or the roughness of a road."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from jaxveh.statespace import AbstractFilter, AbstractWrapper, Continuous, Discr
 
 
 class VaryingNoise(AbstractWrapper):
-    """Any `inner`, with standard deviations that inputs of the model say, row by row.
+    """Any filter `inner`, with standard deviations that are inputs of the model, row by row.
 
-    `measurement`: the input that is a channel's standard deviation (its unit), by channel (`{"gnss_speed":
-    "gnss_speed_accuracy"}`), that of the same row. `process`: the input that is a state's process noise (unit per root second,
-    or a step, as the model has it), by state: that of the step's first row, or with `process_of="after"` that of its last, the
-    row being filtered, which tells of the time behind it (a brake touched since). The model's noises must be Gaussian, a
-    standard deviation a field; the fields not named keep theirs. Numbers that are not positive end in a result code.
+    `measurement`: by channel, the input that is its standard deviation (in its unit) in the same row
+    (`{"gnss_speed": "gnss_speed_accuracy"}`). `process`: by state, the input that is its process noise (unit per root
+    second, or per step, as in the model). Its value is that of the step's first row, or with `process_of="after"` that
+    of its last row, the one being filtered, if the input describes the time before its row (such as a brake used since
+    the row before). The model's noises must be Gaussian, with one standard deviation per field; fields that are not
+    named keep theirs. Values that are not positive lead to a result code.
     """
 
     whitens: ClassVar[bool] = True
@@ -67,12 +68,14 @@ class VaryingNoise(AbstractWrapper):
             laws.append(("process noise", model.process_noise.law))
         if self.measurement:
             kit.check_fixed(
-                "VaryingNoise.measurement", model.measurement_noise, "Its function may take the input itself."
+                "VaryingNoise.measurement", model.measurement_noise, "Let its function use the input directly."
             )
         for what, law in laws:
             if not isinstance(law, Gaussian):
                 kind = type(law).__name__
-                raise InputError(f"VaryingNoise: the {what} is {kind}: must be Gaussian, a standard deviation a field.")
+                raise InputError(
+                    f"VaryingNoise: the {what} is {kind}: must be Gaussian, one standard deviation per field."
+                )
         if self.measurement:
             kit.check_noise_by_row("VaryingNoise", self.inner)
         self.inner.check(model)
@@ -85,20 +88,20 @@ class VaryingNoise(AbstractWrapper):
         return self.inner._step(self._with_noise_of(model, row.u, moved), belief, row)
 
     def _with_noise_of(self, model: StateSpace, now: Any, moved: Any) -> StateSpace:
-        """The model with what the inputs `now` say of the measurement, and those `moved` of the process."""
+        """The model with measurement noise from the inputs `now` and process noise from the inputs `moved`."""
         if self.measurement:
             law = _with(model.measurement_noise, self.measurement, now)
             model = eqx.tree_at(lambda m: m.measurement_noise, model, law)
         if self.process:
             noise = model.process_noise
-            assert noise is not None  # `check` has seen to it
+            assert noise is not None  # `check` ensures it
             model = eqx.tree_at(lambda m: m.process_noise.law, model, _with(noise.law, self.process, moved))
         return model
 
 
 def _with(law: Gaussian, told: tuple[tuple[str, str], ...], u: Any) -> Gaussian:
     stds = dict(told)
-    # A number that is none must not be taken for one: NaN ends in a result code.
+    # A value that is no standard deviation must not be used: NaN leads to a result code.
     positive = lambda value: jnp.where(value > 0, value, jnp.nan)
     new = {name: positive(getattr(u, stds[name])) if name in stds else std for name, std in law.std._asdict().items()}
     return eqx.tree_at(lambda l: l.std, law, type(law.std)(**new))

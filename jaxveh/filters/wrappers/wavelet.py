@@ -1,4 +1,4 @@
-"""Measurement noise from the measurements' own fastest changes."""
+"""Measurement noise from the fastest changes of the measurements."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ NORMAL_MEDIAN = 0.6744897501960817
 
 
 class Window(NamedTuple):
-    """The last measurements of each channel, `values` (window, m), newest last; how many there were, `count` (m,); and the
-    `variances` (m,) in use."""
+    """The last measurements of each channel, `values` (window, m), newest last; the number of measurements so far,
+    `count` (m,); and the `variances` (m,) in use."""
 
     values: Any
     count: Any
@@ -33,7 +33,7 @@ class Window(NamedTuple):
 
 
 class AbstractHaar(AbstractWrapper):
-    """A filter around another that takes its variances from a `Window`, by the settings that `HaarNoise` tells of."""
+    """A filter around another with variances from a `Window`; `HaarNoise` describes the settings."""
 
     has_covariance: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
@@ -55,16 +55,16 @@ class HaarNoise(AbstractHaar, AbstractLearnedNoise):
 
         d_j = (y_{2j+1} - y_{2j}) / sqrt(2),    sigma = median |d| / 0.6745,    R <- b R + (1 - b) sigma^2
 
-    with b = `forgetting` (D. Donoho & I. Johnstone 1994). Channel by channel, of the rows where it is present. It asks nothing of
-    the model, so that the model's errors are no noise to it; but the signal must move less than the noise from row to row: of a
-    fast manoeuvre or of coarse samples it makes noise, noise that is coloured it does not see, and of noise that jumps up it
-    learns half a window late, trusting wild values meanwhile (gate them). Always variances stay between `floor` and `ceiling`
-    times the model's own (a channel that is quantised, or stuck, has a median of zero). The noise must be Gaussian, a standard
-    deviation a channel.
+    with b = `forgetting` (D. Donoho & I. Johnstone 1994). Each channel has its own sigma, over the rows in which it is
+    present. The estimate does not use the model, so that model errors are not taken for noise. However, the signal must
+    change less than the noise from row to row: fast manoeuvres and coarse samples are taken for noise, coloured noise
+    is missed, and a jump of the noise is noticed half a window late, with outliers trusted meanwhile (gate them).
+    Variances are limited to `floor` and `ceiling` times the model's own (a quantised or stuck channel has a median of
+    zero). The noise must be Gaussian, with one standard deviation per channel.
 
-    Until a channel has had `fewest` rows (at least 2; None: a full window, as printed), `initial` times the model's own
-    variances hold; from then on as much of the window counts as is there. Where the noise may be far above the data sheet's
-    from the first row on, `initial` is what that row is worth: what is believed then for no reason, a slow state keeps.
+    Until a channel has had `fewest` rows (at least 2; None: a full window, as in the paper), its variance is `initial` times the
+    model's own; after that, the median is over the rows that the window has so far. If the noise may be far above the data
+    sheet's from the first row on, choose a large `initial`, as a slow state keeps an error that it takes from the first rows.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
@@ -82,11 +82,11 @@ class HaarNoise(AbstractHaar, AbstractLearnedNoise):
 
 
 class HaarParticles(AbstractHaar):
-    """What `HaarNoise` does, around a particle `inner`, whose likelihood need not be Gaussian.
+    """The variances of `HaarNoise` for a particle filter `inner`, whose likelihood need not be Gaussian.
 
-    The settings are those of `HaarNoise`. Of a `CauchyGaussianMixture` the variances are those of its Gaussian part (Qin et al.
-    2014); `follows="both"` scales the Cauchy part by the same factor, `"gaussian"` (the default, as the paper has it) leaves
-    it. The belief is that of the filter with the `Window` as its memory.
+    The settings are those of `HaarNoise`. For a `CauchyGaussianMixture`, the variances are those of its Gaussian part
+    (Qin et al. 2014); `follows="both"` scales the Cauchy part by the same factor, `"gaussian"` (the default, as in the
+    paper) does not. The belief is that of the filter with the `Window` as its memory.
 
     **Raises** `InputError` for settings out of range, a filter without particles, or a law of another kind.
     """
@@ -98,16 +98,16 @@ class HaarParticles(AbstractHaar):
         if not isinstance(self.inner, AbstractParticleFilter):
             kind = type(self.inner).__name__
             raise InputError(
-                f"HaarParticles: {kind} inside: must be a particle filter; HaarNoise is for Gaussian ones."
+                f"HaarParticles: {kind} inside: must be a particle filter. For Gaussian filters use HaarNoise."
             )
         check_one_of("HaarParticles.follows", self.follows, ("gaussian", "both"))
 
     def check(self, model):
         law = model.measurement_noise
-        kit.check_fixed("HaarParticles", law, "Take the particle filter by itself.")
+        kit.check_fixed("HaarParticles", law, "Use the particle filter without this wrapper.")
         if not isinstance(law, Gaussian | CauchyGaussianMixture):
             raise InputError(
-                f"HaarParticles: the measurement noise is {type(law).__name__}: must be Gaussian, a standard deviation a "
+                f"HaarParticles: the measurement noise is {type(law).__name__}: must be Gaussian, one standard deviation per "
                 "channel, or CauchyGaussianMixture."
             )
         self.inner.check(model)
@@ -134,7 +134,7 @@ class HaarParticles(AbstractHaar):
 
 
 def check_settings(settings: Any) -> None:
-    """Raise `InputError` unless window, forgetting, floor and ceiling make sense."""
+    """Raise `InputError` unless the settings are within their ranges."""
     who = type(settings).__name__
     if not isinstance(settings.window, int) or settings.window < 4 or settings.window % 2:
         raise InputError(f"{who}.window = {settings.window}: must be an even whole number of at least 4.")
@@ -166,7 +166,7 @@ def window_after(settings: Any, own: Any, memory: Window, given: Any) -> Window:
     longer = jnp.concatenate([memory.values[1:], jnp.where(here, given, 0.0)[None]])
     values = jnp.where(here, longer, memory.values)
     count = memory.count + here.astype(jnp.int32)
-    # Pairs as the window lies now, not as they fell: each row is in one.
+    # Pairs are formed in the window as it is now: each row is in one pair.
     details = (values[1::2] - values[::2]) * 0.5**0.5
     found = jnp.square(_median_of_last(jnp.abs(details), count // 2) / NORMAL_MEDIAN)
     found = jnp.clip(found, settings.floor * own, settings.ceiling * own)
