@@ -51,7 +51,7 @@ def fence(tree: Tree, *, firm: bool = False) -> Tree:
     the barrier before jax 0.12: there, 1000 7-DOF cars take 175 instead of 400 ns per step with it, and one car takes
     7.3 instead of 9.6 us.
     """
-    return _of_traced(tree, _firmly(worth=False) if firm else lax.optimization_barrier)
+    return _of_traced(tree, _firmly(worth=False) if firm else _barrier)
 
 
 def fence_blocks(tree: Tree) -> Tree:
@@ -88,7 +88,12 @@ def _firmly(worth: bool) -> Callable:
     return lambda leaves: _firm.bind(*leaves, worth=worth, barrier=barriers_hold())
 
 
-# This is a primitive for two reasons. Whether a fence pays depends on the size, which under `vmap` is known only with
+def _barrier(leaves: list) -> list:
+    return _firm.bind(*leaves, worth=False, barrier=True)
+
+
+# This is a primitive for three reasons. The transpose of `lax.optimization_barrier` in jax 0.11 and 0.12 fails if an operand
+# is not differentiated, as zeros that a `custom_jvp` has made arrays are not. Whether a fence pays depends on the size, which under `vmap` is known only with
 # the batch; and an ordinary `lax.cond` would become a selection there, which does not fence. A step of 240 vmapped
 # 7-DOF cars on MF-Tyre takes 2.8 instead of 17 us per car on jax 0.10, and 1.9 instead of 2.4 on jax 0.12.
 
@@ -132,6 +137,13 @@ def _always(number):
     return lax.bitcast_convert_type(number, kind) != kind(unused)
 
 
+def _transposed(cotangents, *operands, **how):
+    """Cotangents of the operands in which the fence is linear; None for the others, which are known."""
+    linear = [ad.is_undefined_primal(operand) for operand in operands]
+    found = iter(_of_those_there([c for c, there in zip(cotangents, linear, strict=True) if there], **how))
+    return [next(found) if there else None for there in linear]
+
+
 def _of_those_there(values, **how):
     """Tangents or cotangents, with fences for those that are not symbolic zeros."""
     values = list(values)
@@ -152,7 +164,7 @@ ad.primitive_jvps[_firm] = lambda primals, tangents, **how: (
     _firm.bind(*primals, **how),
     _of_those_there(tangents, **how),
 )
-ad.primitive_transposes[_firm] = lambda cotangents, *primals, **how: _of_those_there(cotangents, **how)
+ad.primitive_transposes[_firm] = _transposed
 
 
 @eqx.filter_jit
