@@ -1,10 +1,12 @@
-"""Which tests run by default: each test function has a budget of seconds, and long ones are left to `.ci/run`.
+"""Which tests run by default: each test function has a budget of seconds, and long cases are left to `.ci/run`.
 
-`tests/recorded/seconds.json` has the seconds that one case of a test function took when they were last recorded, of those
-functions that take long enough to matter. Beyond `BUDGET` a function's time grows with the square root of what all of its cases
-would take: at least one runs, the others are left to `-m full`. Each function of a file begins at another case, so that most
-members of a class (every filter, every method) meet some test. A case that takes longer than `LONGEST` is `thorough`. A test that is
-not on record runs whole, so that a new one is never left out.
+`tests/recorded/seconds.json` has the seconds that one case of a test function took when last recorded, for functions that take
+longer than `BUDGET`. Beyond it a function's time grows with the square root of the time of all its cases: at least one case
+runs, the others are left to `-m full`. Each function of a file starts at another case, so that most members of a class (every
+filter, every method) meet some test. A case that takes longer than `LONGEST` is `thorough`. A function that is not on record
+runs whole, so that a new one is never left out.
+
+`JAXVEH_SECONDS=1 python -m pytest` records them again.
 """
 
 import json

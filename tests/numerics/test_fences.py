@@ -87,7 +87,9 @@ def test_what_is_not_differentiated_may_be_fenced_beside_what_is(transform, fenc
     known = jnp.full((4, 3), 0.7)
 
     def of(step):
-        last = lambda x: jax.lax.scan(lambda x, row: (step(x, row), None), x, known)[0] if scanned else step(x, known[0])
+        last = lambda x: (
+            jax.lax.scan(lambda x, row: (step(x, row), None), x, known)[0] if scanned else step(x, known[0])
+        )
         return lambda x: jnp.sum(last(x))
 
     found = transform(of(lambda x, row: product(x, row, fenced)))(X)

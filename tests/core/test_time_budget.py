@@ -1,0 +1,49 @@
+"""Which cases of a test function run by default."""
+
+import json
+
+import pytest
+import time_budget
+from time_budget import BUDGET, function_of, number_kept, record_seconds, spread_evenly
+
+
+@pytest.mark.parametrize("most", [1, 2, 7, 67])
+def test_what_fits_runs_whole_and_of_what_does_not_at_least_one_case(most):
+    assert number_kept(0.0, most) == most
+    assert number_kept(BUDGET / most, most) == most
+    assert number_kept(1000.0 * BUDGET, most) == 1
+    kept = [number_kept(seconds, most) for seconds in (0.01, 0.1, 1.0, 10.0)]
+    assert sorted(kept, reverse=True) == kept
+
+
+def test_the_time_of_many_cases_grows_with_its_root():
+    assert number_kept(BUDGET, 64) == 8
+    assert number_kept(BUDGET / 4.0, 64) == 16
+
+
+@pytest.mark.parametrize("first", [0, 3, 700])
+def test_cases_are_spread_evenly_and_begin_anywhere(first):
+    for many in range(1, 20):
+        for few in range(1, many + 1):
+            places = spread_evenly(many, few, first)
+            assert len(places) == few and places <= set(range(many))
+            gaps = [b - a for a, b in zip(sorted(places), [*sorted(places)[1:], min(places) + many], strict=True)]
+            assert max(gaps) - min(gaps) <= 1
+
+
+def test_what_did_not_run_keeps_its_seconds(tmp_path, monkeypatch):
+    monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
+    record_seconds({"tests/a.py::slow[1]": 2.0, "tests/a.py::slow[2]": 4.0, "tests/a.py::quick": 0.1})
+    record_seconds({"tests/b.py::slow": 5.0})
+    assert json.loads(time_budget.RECORD.read_text()) == {"a.py::slow": 3.0, "b.py::slow": 5.0}
+    record_seconds({"tests/a.py::slow[1]": 0.2})
+    assert json.loads(time_budget.RECORD.read_text()) == {"b.py::slow": 5.0}
+
+
+def test_every_function_on_record_is_a_test_that_there_is():
+    """A test that was renamed would run whole."""
+    tests = time_budget.RECORD.parents[1]
+    for name in json.loads(time_budget.RECORD.read_text()):
+        file, _, function = name.partition("::")
+        assert f"def {function.rpartition('::')[2]}(" in (tests / file).read_text("utf-8"), name
+    assert function_of("tests/a.py::slow[a[b]]") == "a.py::slow"
