@@ -49,6 +49,7 @@ def fit_for(program: Any, devices: list) -> list:
         return devices
     fit = (workers() - 1) // places
     if fit == 0:
+        warnings.warn(
             f"{places} kernels of this program may at once block one of the {workers()} workers of jax {jax.__version__}; once "
             f"all are blocked, it never ends. Set the environment variable {POOL} to {places + 1} or more before jax starts, "
             "or take jax 0.12.",
@@ -80,10 +81,10 @@ def _computations(text: str) -> list[tuple[str, list[str]]]:
 
 
 def _at_once(lines: list[str], most: dict[str, int]) -> int:
-    """The number of kernels of one computation that may run at once. Kernels that need each other's results form a chain,
-    of which one runs at a time; an instruction that calls computations counts as many kernels as they have."""
-    needs: dict[str, int] = {}  # by instruction: the waiting ones that it follows from, a bit each
-    chains: list[tuple[int, int]] = []  # the last waiting one, and the most that one of the chain counts
+    """The number of kernels of one computation that may run at once. Kernels that need each other's results form a chain, of
+    which one runs at a time; an instruction that calls computations counts as many kernels as they have."""
+    needs: dict[str, int] = {}  # by instruction: the waiting kernels from which it follows, one bit each
+    chains: list[tuple[int, int]] = []  # the last waiting kernel, and the largest count in the chain
     waiting = 0
     for line in lines:
         own, _, rest = line.partition(" = ")
@@ -109,8 +110,7 @@ def _waits(line: str) -> bool:
 
 
 def workers() -> int:
-    """The number of worker threads of the process: one per core or the value of `POOL` (or NPROC), at least one per
-    device."""
+    """The number of worker threads of the process: one per core or the value of `POOL` (or NPROC), at least one per device."""
     told = os.environ.get(POOL) or os.environ.get("NPROC")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(int(told) if told else cores, len(jax.devices("cpu")))
