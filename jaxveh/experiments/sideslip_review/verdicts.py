@@ -105,15 +105,15 @@ CLAIMS = (
     _claim("PF is better than EKF", "limit", "PF", "EKF"),
     _claim("UPF is the best of UPF, UKF and EKF", "limit", "UPF", "UKF"),
     _claim("UPF is the best of UPF, UKF and EKF", "limit", "UPF", "EKF"),
-    _claim("pseudo-integration tolerates sensor bias better than integration", "sensor bias", "pseudo-integration", "integration"),
-    _claim("pseudo-integration tolerates banks better than integration", "bank", "pseudo-integration", "integration"),
-    _claim("pseudo-integration tolerates model errors better than the model", "parameters", "pseudo-integration", "EKF"),
+    _claim("pseudo-integration handles sensor bias better than integration", "sensor bias", "pseudo-integration", "integration"),
+    _claim("pseudo-integration handles banks better than integration", "bank", "pseudo-integration", "integration"),
+    _claim("pseudo-integration handles model errors better than the model", "parameters", "pseudo-integration", "EKF"),
     Claim(
         "pseudo-integration does not remove the bias of a_y", ("early", "pseudo-integration", "sensor bias"),
         ("early", "pseudo-integration", "normal"), 1.0 / BETTER, float("inf"),
     ),
-    _claim("weighted fusion tolerates sensor bias better than kinematics", "sensor bias", "weighted", "kinematic Kalman"),
-    _claim("weighted fusion tolerates model errors better than the model", "parameters", "weighted", "EKF"),
+    _claim("weighted fusion handles sensor bias better than kinematics", "sensor bias", "weighted", "kinematic Kalman"),
+    _claim("weighted fusion handles model errors better than the model", "parameters", "weighted", "EKF"),
 )  # fmt: skip
 """The text's claims about methods, with ours in place of those that it names."""
 

@@ -48,7 +48,7 @@ def claims(result: Reproduction) -> list[Claim]:
                   step("APF", what), step("prior", what))
             for what in STEP_OUTPUTS
         ],
-        Claim("a low-pass of 20 Hz in the sensors makes no difference (UKF)", lane("low-pass, not told"), lane("as the study"), *SAME),
+        Claim("a sensor low-pass of 20 Hz makes no difference (UKF)", lane("low-pass, not told"), lane("as the study"), *SAME),
         Claim("nor does it if the filter has it in its model (UKF)", lane("low-pass, told"), lane("as the study"), *SAME),
         Claim("eqs 12, 14: longitudinal forces in the model reduce the error (UKF)", lane("drive torque, told"),
               lane("drive torque, not told")),

@@ -7,8 +7,8 @@ from jaxveh.experiments.tyre_apf.saturated import SWEEP
 from jaxveh.experiments.tyre_apf.settings import LEVELS, STEP_STEER
 
 _LANE = (
-    "median over the drives; the truth is the filter's own single track, whose mass and inertia it is told, and the sensors' noise; "
-    "priors of 10 % about other tyres; process noise by the filters' likelihood on other drives"
+    "median over the drives; the truth is the filter's own single track, whose mass and inertia it is told, and the sensors' "
+    "noise; priors of 10 % about other tyres; process noise by the filters' likelihood on other drives"
 )
 _BOUND = "the truth is the filter's own car; the information in one drive, for any estimator"
 _SWEEP = _LANE + "; steering is linear between rows, only D and B unknown"

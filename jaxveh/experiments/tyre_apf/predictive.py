@@ -84,7 +84,7 @@ def main() -> None:
         spread = likelihood_ratio(raced, PAPERS_PARTICLES, i)
         print(f"{level.yaw_rate:g} rad/s, {level.a_y:g} m/s^2, {level.noise}")
         print(
-            f"   error {error:.3f} of the plain filter's, wins {wins:.0%}, range of the log-likelihood {spread:.3f} times as large"
+            f"   error {error:.3f} of the plain filter's, wins {wins:.0%}, range of log-likelihood {spread:.3f} times as large"
         )
 
 
