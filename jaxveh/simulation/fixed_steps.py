@@ -68,7 +68,7 @@ def fixed_steps(
     if len(shapes) > 1 or len(next(iter(shapes))) > 1:
         raise InputError(f"x0: shapes {sorted(shapes)}; with a block all must be arrays (N,) of one length.")
     runs = np.size(leaves[0])
-    # Where a barrier does not hold, short arrays cost more time than the memory that they save.
+    # Where a barrier does not hold, short arrays cost more time than memory access does.
     return _in_blocks(run, x0, args, runs, block) if block < runs and on_cpu() and barriers_hold() else run(x0, args)
 
 

@@ -22,7 +22,7 @@ from jaxveh.simulation.stiffness import SolverChoice
 from jaxveh.statespace import RK4, Heun, RolledRK4
 
 ADAPTIVE_STEPS_A_ROW = 64
-"""Steps that a solver with its own step size may take, as a multiple of the number of the longest equal steps."""
+"""Most steps of a solver with its own step size, as a multiple of the number of equal steps of the greatest length."""
 
 TOLD_FROM = 50_000
 """Number of equal steps from which on a simulation reports its progress: fewer take at most a second, and jax caches no compiled

@@ -69,7 +69,7 @@ def fastest_pole(driven: Driven, t: Any, x: Any) -> jax.Array:
     """The spectral radius of the Jacobian of car, driver and sensors at one instant, 1/s, within a few per cent.
 
     By power iteration with Jacobian-vector products: the mean growth over its second half, which is that of the largest
-    eigenvalue, real or a complex pair. The sensors' low-pass does not act on the car, so its poles are added separately.
+    eigenvalue, real or a complex pair. The sensors' low-pass does not act on the car, so its poles are taken separately.
     """
     bare = Driven(Instrumented(driven.car.vehicle), driven.driver)
     moving = DrivenState(driven.car.split(x.car)[0], x.driver)

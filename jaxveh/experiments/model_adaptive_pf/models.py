@@ -135,7 +135,7 @@ def spinning_model(study: Study, car: SevenDOF, start_speed) -> StateSpace:
 
 
 def heavy_dynamics(study: Study, car: TwoTrack3DOF, start_speed) -> StateSpace:
-    """`dynamics` whose process noise, too, is the alpha-stable mixture of eqs 12 to 14, as the paper says that it may be:
+    """`dynamics` whose process noise, too, is the alpha-stable mixture of eqs 12 to 14, which the paper says is possible:
     per row the same Gaussian part, and Cauchy tails."""
     plain = dynamics(study, car, start_speed)
     stds = {"v_x": study.v_x_noise, "v_y": study.v_y_noise, "yaw_rate": study.yaw_noise}
