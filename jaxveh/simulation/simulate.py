@@ -76,7 +76,7 @@ def simulate(
     too short. "explicit" and "implicit" are always obeyed; a warning says where equal steps were too long for the motion. A
     diffrax solver takes equal steps, or its own with a `stepsize_controller`. Under jit, vmap or grad values cannot be checked:
     "auto" is then "explicit". `adjoint`: diffrax's way to differentiate; the default serves reverse mode, and also forward mode
-    with equal steps and no event (otherwise `diffrax.ForwardMode()`). `progress` is called with the share done (single runs). All of it may
+    with equal steps and no event (otherwise `diffrax.ForwardMode()`). `progress` gets the share done (single runs). All of it may
     be jitted, vmapped over keys, cars and manoeuvres, and differentiated by any of their leaves.
 
     **Raises** `InputError` for arguments out of range, sensors or an event of a wrong type, a manoeuvre without an input that the
