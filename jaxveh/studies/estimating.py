@@ -83,7 +83,9 @@ def _as_told(settings: Mapping[str, Any], car: Any, devices: Any) -> sensors.Sen
         return sensors.SensorSet(Gaussian(told))
     noise = {name: std for name, std in {**devices.noise.std._asdict(), **told}.items() if name not in car.inputs}
     if not noise:
-        raise InputError(f"sensors: measure only inputs of {type(car).__name__} ({', '.join(car.inputs)}).")
+        raise InputError(
+            f"sensors: measure only inputs of {type(car).__name__} ({', '.join(car.inputs)}); add an output, as yaw_rate."
+        )
     return sensors.SensorSet(Gaussian(noise), devices.position, devices.low_pass)
 
 

@@ -55,7 +55,7 @@ def sweep(
 
     **Arguments**: `run`, a pure function of one point (a NamedTuple with the design's names) and of a key, of data or of
     both, as given, that returns a mapping or NamedTuple of arrays (trees of them get dotted names, `parameters.front.B`);
-    `seeds`, their number (with `data` its own); `data`, a tree of arrays that begin with the axes of numbers and the seeds:
+    `seeds`, how many (default: as many as in `data`); `data`, a tree of arrays that begin with the axes of numbers and the seeds:
     each run gets its own part (drives for several filters); `batch`, runs at a time (default: all points of a choice, or as
     many as fit into `memory`, bytes: half of the machine's); `devices`, over which a batch is split by `shard_map` (default:
     all of `jax.devices()`: on a CPU one, unless `jax_num_cpu_devices` is set before jax starts; a run that fits with

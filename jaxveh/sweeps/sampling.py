@@ -16,7 +16,7 @@ class Samples(NamedTuple):
 
 
 def latin_hypercube(count: int, *, seed: int = 0, **ranges: tuple[float, float]) -> Samples:
-    """`count` points, with one of them in each of `count` equal parts of its range (M. D. McKay et al. 1979).
+    """`count` points: for each name, one lies in each of `count` equal parts of its range (M. D. McKay et al. 1979).
 
         Design(car=latin_hypercube(500, mass=(1200.0, 1800.0), friction=(0.3, 1.1)))     run sees point.car.mass
 
