@@ -139,7 +139,7 @@ PARAMETERS = (
         "dual filter",
         "3.1.1.2 [102-104]",
         ("filters.Dual",),
-        "the list of 103 states is not built: it is in none of the texts",
+        "the list of 103 states is not formed: it is in none of the texts",
     ),
     System(
         "parameters of a tyre by a filter", "3.1.1 [129-132]", ("statespace.with_parameters", "experiments.tyre_apf")

@@ -26,7 +26,7 @@ class Printed:
 
     `spread`: 1 is the printed I(11), in the units of each parameter; `share`: the final rule's 20 per cent. The steering
     amplitude (rad) and the measured outputs are not printed: ours, as in the other studies. `as_printed_geometry`: the printed
-    axle distances, which are almost surely swapped; with the literal spread the car spins with either.
+    axle distances, which are almost surely swapped; with the literal spread the car spins in both geometries.
     """
 
     particles: int = 300

@@ -90,7 +90,7 @@ LOOKING_AHEAD = (
 
 @dataclasses.dataclass(frozen=True)
 class Study:
-    """The honest study: a double lane change, a prior that does not contain the truth, four estimators side by side.
+    """The honest study: a double lane change, a prior whose mean is not the truth, four estimators side by side.
 
     `speed` m/s; `steer` rad at the road wheels; `duration` s; `rate` Hz; `yaw_rate_std` rad/s and `a_y_std` m/s^2 the
     sensors' noise; `prior` the relative standard deviation of the parameters (E: times 2, so 0.2); `particles`; `window` s

@@ -36,7 +36,7 @@ CHAPTERS = {
 """The review's chapters, and the quantities of `jaxveh.estimators` that belong to each."""
 
 LATEST = 100
-"""Most rows by which an estimate is searched to be late or early."""
+"""Rows: the largest delay or lead of an estimate that is looked for."""
 
 
 class ChaptersRaced(NamedTuple):

@@ -14,7 +14,7 @@ class Scenario(NamedTuple):
     - `friction`, `friction_later` (-): of the road, in its first half and after it. `split` (-): by which share it is less under
       the right wheels; the border runs under the middle of the car.
     - `bank`, `grade` (rad): standard deviations along the way.
-    - `drop` (m/s): by how much the driver slows down within 2 s, half way; `wheelspin` (m/s): by how much he speeds up there.
+    - `drop` (m/s): by how much the driver slows down within 2 s, half way; `wheelspin` (m/s): by how much faster instead.
     - `offsets`, `spread` (-): offsets of the inertial sensors, and errors of the car's file, as multiples of the ordinary ones.
     - `stiffness`, `load` (-): factor of the true tyres' stiffness, and added share of the body's mass.
     - `outage` (s): how long the satellites have no measurements, from a third of the drive on.
