@@ -1,4 +1,4 @@
-"""One folder a paper: configuration, run, and check against the printed numbers."""
+"""One folder per paper: settings, run, and check against the printed numbers."""
 
 from jaxveh._core.lazy import submodules
 

@@ -1,4 +1,4 @@
-"""What every experiment reports: tables for people, and criteria that hold, fail or stay open."""
+"""The report of every experiment: tables to print, and criteria that are met, failed or open."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from jaxveh._core.errors import InputError
 from jaxveh.sweeps import ConfidenceInterval
 
 MET, FAILED, OPEN = "met", "failed", "open"
-"""What becomes of a criterion: it is met, it is not, or what was found cannot decide."""
+"""The outcomes of a criterion: it is met, it is not met, or the result cannot decide."""
 
 BETTER = 0.95
-"""An error that is smaller by less than a twentieth is no smaller error."""
+"""A ratio of errors above this counts as no improvement: the error must be smaller by a twentieth at least."""
 
 
 class Terms(NamedTuple):
-    """What a criterion rests on, written down before anything runs.
+    """The terms of a criterion, written down before anything runs.
 
-    `condition`: what is assumed, and who was told what. `original`: empty for a criterion as it was asked; else the name of the
-    one as asked that this one stands beside, since it took its place or asks the same under another condition.
+    `condition`: the assumptions, and who was told what. `original`: empty for a criterion as it was asked; otherwise the
+    name of the criterion as asked that this one replaces, or repeats under another condition.
     """
 
     condition: str
@@ -33,7 +33,7 @@ Criteria = Mapping[str, Terms]
 
 
 class Check(NamedTuple):
-    """One criterion: what was found, the bound, `status` (met, failed or open), and its `Terms`."""
+    """One criterion: the value found, the bound, `status` (met, failed or open), and its `Terms`."""
 
     name: str
     value: float
@@ -44,12 +44,12 @@ class Check(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether it is met; what is open is not."""
+        """Whether it is met; an open criterion is not."""
         return self.status == MET
 
 
 class Tally(NamedTuple):
-    """How many criteria, as they were asked, there are, `of`, and how many are `met`, `failed` and `open`."""
+    """The numbers of criteria as they were asked: `met`, `failed` and `open`, and all `of` them."""
 
     met: int
     failed: int
@@ -57,7 +57,7 @@ class Tally(NamedTuple):
 
     @property
     def of(self) -> int:
-        """All of them."""
+        """The number of all."""
         return self.met + self.failed + self.open
 
     def __str__(self) -> str:
@@ -66,7 +66,7 @@ class Tally(NamedTuple):
 
 
 def at_most(name: str, value, bound: float) -> Check:
-    """A criterion that holds at or below the bound; what is not a number does not hold."""
+    """A criterion that holds at or below the bound; it does not hold for NaN."""
     return _make_check(name, value, bound, value <= bound)
 
 
@@ -81,7 +81,7 @@ def at_least(name: str, value, bound: float) -> Check:
 
 
 def leave_open(check: Check) -> Check:
-    """The criterion left open, whatever its number says: `check` for what cannot decide."""
+    """The criterion left open, whatever its number: for a `check` whose result cannot decide."""
     return check._replace(status=OPEN)
 
 
@@ -90,32 +90,32 @@ def _make_check(name: str, value, bound: float, holds) -> Check:
 
 
 def with_terms(checks: Iterable[Check], criteria: Criteria) -> list[Check]:
-    """The checks with their terms, in the criteria's order, so that what took the place of another stands behind it.
+    """The checks with their terms, in the order of the criteria, so that one that replaces another follows it.
 
-    **Raises** `InputError` where checks and criteria are not the same: none is left out, and none comes without its terms.
+    **Raises** `InputError` if checks and criteria differ: none may be left out, and none may come without its terms.
     """
     found = {check.name: check for check in checks}
     if set(found) != set(criteria):
         raise InputError(
-            f"checks without terms: {sorted(set(found) - set(criteria))}; criteria that were not looked at: "
+            f"checks without terms: {sorted(set(found) - set(criteria))}; criteria that were not checked: "
             f"{sorted(set(criteria) - set(found))}."
         )
     return [found[name]._replace(**terms._asdict()) for name, terms in criteria.items()]
 
 
 def tally(checks: Iterable[Check]) -> Tally:
-    """The count of the criteria as they were asked: those that stand beside them are shown, and not counted."""
+    """The count of the criteria as they were asked; those that replace or repeat them are shown, but not counted."""
     asked = [check.status for check in checks if not check.original]
     return Tally(*(asked.count(status) for status in (MET, FAILED, OPEN)))
 
 
 def number_asked(criteria: Criteria) -> int:
-    """How many criteria there are as they were asked."""
+    """The number of criteria as they were asked."""
     return sum(not terms.original for terms in criteria.values())
 
 
 def judge_ratio(found: ConfidenceInterval, low: float = 0.0, high: float = BETTER) -> str:
-    """Whether a ratio is within bounds: met or failed where its interval is inside or outside of them, else open."""
+    """Whether a ratio is within bounds: met or failed if its interval is inside or outside of them, otherwise open."""
     if not np.isfinite(found.value) or found.low > high or found.high < low:
         return FAILED
     return MET if found.low >= low and found.high <= high else OPEN
@@ -128,7 +128,8 @@ def interval(found: ConfidenceInterval, digits: int = 3) -> str:
 
 
 def spread(values, digits: int = 3, scale: float = 1.0, lost: str = "lost") -> str:
-    """`median [lower quartile, upper quartile]` of the values; those that are not finite count as the largest, and are `lost`."""
+    """`median [lower quartile, upper quartile]` of the values; those that are not finite count as the largest and are
+    `lost`."""
     values = scale * np.asarray(values, float)
     low, mid, high = np.percentile(np.where(np.isnan(values), np.inf, values), [25, 50, 75], method="nearest")
     shown = lambda v: lost if np.isinf(v) else f"{v:.{digits}g}"

@@ -1,4 +1,4 @@
-"""Every system of a paper, and where this package has it: what a paper's `SYSTEMS` declares, and the page made of it."""
+"""Every system of a paper and its place in this package: the entries of a paper's `SYSTEMS`, and the page made of them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 
 class System(NamedTuple):
-    """`what`: a model, a method, a table or a claim; `where` the paper has it (section, equation, table, its reference). `found`:
-    who has it here, names below `jaxveh`, the entries of a mapping in brackets. `lacks`: what is not there, and why."""
+    """`what`: a model, a method, a table or a claim; `where` it is in the paper (section, equation, table, its reference).
+    `found`: its names below `jaxveh`, with entries of a mapping in brackets. `lacks`: what is not here, and why."""
 
     what: str
     where: str
@@ -18,8 +18,7 @@ class System(NamedTuple):
 
 
 def resolve_name(name: str) -> Any:
-    """What a name below `jaxveh` stands for: modules, attributes, `mapping[key]`. **Raises** `LookupError` where it stands for
-    nothing."""
+    """The object of a name below `jaxveh`: modules, attributes, `mapping[key]`. **Raises** `LookupError` if there is none."""
     plain, _, key = name.partition("[")
     found: Any = importlib.import_module("jaxveh")
     path = "jaxveh"
@@ -40,7 +39,7 @@ def resolve_name(name: str) -> Any:
 
 
 def systems_page(papers: Mapping[str, Sequence[System]]) -> str:
-    """A Markdown table a paper."""
+    """One Markdown table per paper."""
     parts = []
     for title, systems in papers.items():
         lines = [f"## {title}", "", "| system | in the paper | here | not here |", "| --- | --- | --- | --- |"]

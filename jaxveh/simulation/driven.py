@@ -19,20 +19,20 @@ from jaxveh.vehicles import kit as vehicles_kit
 
 
 class DrivenState(NamedTuple):
-    """The state of the car with its sensors, and that of its driver."""
+    """The state of the car with its sensors, and the state of its driver."""
 
     car: Any
     driver: Any
 
 
 class Driven(eqx.Module):
-    """A car on its way: `car` with sensors, a `Travelling` within, and the `driver` who sees how it moves."""
+    """A driven car: `car` with sensors, around a `Travelling`, and the `driver` who sees how it moves."""
 
     car: Instrumented
     driver: AbstractDriver
 
     def start(self, t: Any, dtype: Any, **values: Any) -> DrivenState:
-        """Straight running at the driver's speed (fields of the car's state replaced by keyword), the driver settled."""
+        """Straight running at the driver's speed, with the driver settled; keywords replace fields of the car's state."""
         values = {name: jnp.asarray(value, dtype) for name, value in values.items()}
         zero = jnp.zeros((), dtype)
         moves = Motion(*[values.get(name, zero) for name in Motion._fields])
@@ -47,7 +47,7 @@ class Driven(eqx.Module):
         return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), DrivenState(car, driver))
 
     def inputs(self, t: Any, x: DrivenState) -> Any:
-        """What the driver does: the car's inputs."""
+        """The inputs of the car that the driver gives."""
         return self._inputs(t, x)[0]
 
     def derivatives(self, t: Any, x: DrivenState) -> DrivenState:
@@ -56,7 +56,7 @@ class Driven(eqx.Module):
         return DrivenState(self.car.derivatives(t, x.car, u), self.driver.derivatives(t, moves, x.driver))
 
     def see(self, t: Any, x: DrivenState) -> tuple[Any, Any, Any]:
-        """Inputs, outputs of the car, and what the sensors say of them without noise (None without sensors)."""
+        """Inputs, outputs of the car, and the sensors' measurements without noise (None without sensors)."""
         u = self.inputs(t, x)
         return u, *self.car.see(t, x.car, u)
 
@@ -64,7 +64,7 @@ class Driven(eqx.Module):
         vehicle, _ = self.car.split(x.car)
         moves = self.car.vehicle.motion(vehicle, _unknown_inputs(self.car.vehicle)) if not self._told_speed else None
         if moves is None:
-            # A car that is told its speed moves as its driver says; the driver says it without looking at the speed.
+            # A car whose speed is an input moves as its driver says; the driver gives the speed without seeing it.
             blind = self.car.vehicle.motion(vehicle, _unknown_inputs(self.car.vehicle))
             given = self.driver.inputs(t, blind, x.driver)
             moves = blind._replace(v_x=given.v_x)
@@ -79,16 +79,16 @@ class Driven(eqx.Module):
 
 
 def _unknown_inputs(vehicle: AbstractVehicle) -> Any:
-    """Inputs that nobody knows yet, of which a motion asks no more than the speed and the wheels' angles."""
+    """Inputs with zeros for values that are still unknown; a motion needs only the speed and the wheels' angles."""
     return record("Unknown", dict.fromkeys(("v_x", "steer", *vehicle.inputs), 0.0))
 
 
 def adapt_inputs(vehicle: AbstractVehicle, given: Any, moves: Motion) -> Any:
-    """The driver's inputs with those that the car needs and that follow from them.
+    """The driver's inputs, extended by those that the car needs and that follow from them.
 
-    `steering_wheel` from `steer` by the car's steering ratio; a quarter of the torques for each of four motors; of wheels with
-    angles of their own, which a manoeuvre does not say, the front ones turn by `steer` and the rear ones stay straight. The
-    acceleration `a_x` the car makes of `v_x_rate` by itself.
+    `steering_wheel` is `steer` times the car's steering ratio. Each of four motors gets a quarter of the torques. If the wheels
+    have angles of their own, which a manoeuvre does not give, the front wheels turn by `steer` and the rear ones stay straight.
+    The car itself computes the acceleration `a_x` from `v_x_rate`.
     """
     missing = [name for name in vehicle.inputs if name not in given._fields]
     found = {}
@@ -103,14 +103,14 @@ def adapt_inputs(vehicle: AbstractVehicle, given: Any, moves: Motion) -> Any:
 
 
 def steering_ratio(vehicle: Any) -> Any:
-    """The steering ratio of a car with a steering wheel, which is that of the `Steered` among what wraps it."""
+    """The steering ratio of a car with a steering wheel: that of the `Steered` among its wrappers."""
     while not isinstance(vehicle, Steered):
         vehicle = vehicle.vehicle
     return vehicle.ratio
 
 
 def check_inputs(driven: Driven) -> None:
-    """Raise `InputError` where the car needs an input that its driver does not give."""
+    """Raise `InputError` if the car needs an input that its driver does not give."""
     vehicle, driver = driven.car.vehicle, driven.driver
     moves = _still(vehicle)
     given = eqx.filter_eval_shape(
@@ -126,12 +126,12 @@ def check_inputs(driven: Driven) -> None:
 
 
 def vehicle_name(vehicle: Any) -> str:
-    """The class of the car itself, without what wraps it."""
+    """The class name of the car itself, without its wrappers."""
     return type(car_itself(vehicle)).__name__
 
 
 def dtype_of(vehicle: AbstractVehicle) -> Any:
-    """The dtype of the car's parameters, which is that of its states."""
+    """The dtype of the car's parameters, which is also that of its states."""
     return jnp.result_type(jax.tree.leaves(eqx.filter(vehicle, eqx.is_inexact_array))[0])
 
 
@@ -140,15 +140,15 @@ def _still(vehicle: AbstractVehicle) -> Motion:
 
 
 def driver_name(driver: Any) -> str:
-    """The class of the manoeuvre itself, without what wraps it."""
+    """The class name of the manoeuvre itself, without its wrappers."""
     while hasattr(driver, "manoeuvre") or hasattr(driver, "driver"):
         driver = getattr(driver, "manoeuvre", None) or driver.driver
     return type(driver).__name__
 
 
 def with_pedals(manoeuvre: AbstractManoeuvre | AbstractDriver, vehicle: AbstractVehicle) -> AbstractDriver:
-    """The driver of a manoeuvre, who works the pedals where the car has them and the manoeuvre says a speed alone, or pedals
-    that come on top."""
+    """The driver of a manoeuvre. The driver works the pedals if the car has them and the manoeuvre gives only a speed, or gives
+    torques that are added to those of the pedals."""
     driver = as_driver(manoeuvre)
     moves = _still(vehicle)
     given = eqx.filter_eval_shape(lambda: driver.inputs(0.0, moves, driver.start(0.0, moves)))._fields
@@ -172,11 +172,11 @@ def _adds_to_pedals(driver: AbstractDriver) -> bool:
 
 
 def car_itself(vehicle: Any) -> Any:
-    """The car without what wraps it."""
+    """The car without its wrappers."""
     while hasattr(vehicle, "vehicle"):
         vehicle = vehicle.vehicle
     return vehicle
 
 
 LEAST = 1e-6
-"""In place of no drag or rolling resistance, which the driver need not allow for."""
+"""Replaces a drag or rolling resistance of zero, for which the driver need not compensate."""

@@ -1,4 +1,4 @@
-"""What ends a simulation before its time: standstill, a wheel that lifts."""
+"""Events that end a simulation early: standstill, wheel lift."""
 
 from __future__ import annotations
 
@@ -18,18 +18,19 @@ from jaxveh.vehicles import kit
 class Event(eqx.Module):
     """Ends a simulation when `condition(driven, t, x)`, a real number, falls through zero.
 
-    `condition` sees the `Driven` car, the time and its `DrivenState`; `name` is what the recording's source says.
+    `condition` gets the `Driven` car, the time and its `DrivenState`; `name` appears in the recording's source.
     """
 
     condition: Callable = eqx.field(static=True)
     name: str = eqx.field(static=True)
 
     def of_solver(self, tolerance: float) -> diffrax.Event:
-        """The same for diffrax; the instant is found to `tolerance` (s)."""
+        """The diffrax event of this one; its instant is found to `tolerance` (s)."""
 
         def crossing(t, y, args, **_):
-            # diffrax compares it with a number of the default precision, whatever that of the car is. Looked at and kept for
-            # the next step it must be one number: rounded in two ways, a fall that ends a step would be seen by neither.
+            # diffrax compares the value with a number of the default precision, whatever the precision of the car. The value
+            # that is tested and the one that is kept for the next step must be equal: if they were rounded differently, both
+            # would miss a fall at the end of a step.
             return numerics.fence(jnp.asarray(self.condition(args, t, y), float), firm=True)
 
         return diffrax.Event(crossing, Falling(tolerance=tolerance), direction=False)
@@ -44,7 +45,7 @@ def standstill(speed: float = 0.1) -> Event:
 def wheel_lift(load: float = 1.0) -> Event:
     """The load of any wheel falls below `load` (N). **Raises** `InputError` for a load that is not positive.
 
-    The car must have loads a wheel (`load_fl` ...); looking at them computes the tyres' forces once more a step.
+    The car must have a load per wheel (`load_fl` ...). The event computes the tyre forces once more per step.
     """
     check_positive("wheel_lift: load", load, "N")
     return Event(_Lighter(float(load)), f"wheel lift (below {load:g} N)")
@@ -64,7 +65,9 @@ class _Lighter(eqx.Module):
     def __call__(self, driven: Driven, t, x):
         outputs = driven.see(t, x)[1]
         if not set(kit.wheel_names("load")) <= set(outputs._fields):
-            raise InputError(f"wheel_lift: the car has no loads a wheel; its outputs are {', '.join(outputs._fields)}.")
+            raise InputError(
+                f"wheel_lift: the car has no load per wheel; its outputs are {', '.join(outputs._fields)}."
+            )
         least = outputs.load_fl
         for name in kit.wheel_names("load")[1:]:
             least = jnp.minimum(least, getattr(outputs, name))

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import optimistix as optx
 
 HALVINGS = 60
-"""More than any interval needs to shrink to what a double resolves."""
+"""Enough halvings to shrink any interval to the resolution of a double."""
 
 
 class _Interval(NamedTuple):
@@ -20,16 +20,16 @@ class _Interval(NamedTuple):
 
 
 class Falling(optx.AbstractRootFinder):
-    """The end of the interval, at most `tolerance` long or as short as the precision allows, in which a function falls through
-    zero.
+    """The end of the interval in which a function falls through zero; the interval is at most `tolerance` long, or as short as
+    the precision allows.
 
-    Its beginning and end are the options `lower` and `upper`, which are believed to have the fall between them: rounding may
-    make the function's sign at one of them another than it was when the interval was found. The interval alone says when it
-    is enough, so that the function may have any unit; its end is given, where the fall is over.
+    The options `lower` and `upper` are its first beginning and end. The fall is taken to lie between them without a test of the
+    function's signs there, which rounding may have changed since the interval was found. The length of the interval alone
+    decides when the search ends, so the function may have any unit. The result is the interval's end, after the fall.
     """
 
     tolerance: float = eqx.field(static=True)
-    # What optimistix asks of every root finder; nothing here measures a residual.
+    # optimistix requires these fields of every root finder; this one uses no residual.
     rtol: float = eqx.field(static=True, default=0.0)
     atol: float = eqx.field(static=True, default=0.0)
     norm: Any = eqx.field(static=True, default=jnp.abs)

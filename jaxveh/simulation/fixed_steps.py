@@ -1,4 +1,4 @@
-"""Equal steps of a diffrax solver, whole batches at once: the fast way through a simulation."""
+"""Equal steps of a diffrax solver for whole batches at once: the fast way to simulate."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ def fixed_steps(
     """States at `start`, and after each of `rows` times `steps_a_row` steps of `step` (s): leaves (rows + 1, ...).
 
     `rates(t, x, args) -> dx/dt` is elementwise in a batch: x0 may be one state of scalars or a state of arrays (N,), one number
-    a run, in which `args` (a car, say) has scalars where the runs agree and arrays (N,) where they differ. `solver`: any of
-    diffrax that needs no error estimate, default `RK4`. `start` (s) may be traced.
+    per run. `args` (a car, for example) then has scalars where the runs agree and arrays (N,) where they differ. `solver`: any
+    diffrax solver that needs no error estimate, default `RK4`. `start` (s) may be traced.
 
-    It is `diffrax.diffeqsolve` without what equal steps do not need (a controller, dense output, a history of unknown length),
-    whose bookkeeping takes longer than a step where runs are few. A batch as one pytree takes 0.9 of the time of a `jax.vmap`
-    of single runs (7-DOF cars), which works too.
+    It is `diffrax.diffeqsolve` without the parts that equal steps do not need (a controller, dense output, a history of unknown
+    length); for few runs their bookkeeping takes longer than a step. A batch as one pytree takes 0.9 of the time of a `jax.vmap`
+    over single runs (7-DOF cars), which also works.
 
-    `block`: that many runs go through all steps before the next ones start, so that their numbers stay in the processor's
-    nearest cache: 109 instead of 126 ns a step of a 7-DOF car with 64 of 1000 runs (float64), 128 take 112, 32 138. Then every
-    array (N,) of x0 and args must be one number a run, and none may be in the closure of `rates`. Take a multiple of 64. It is
-    left alone where it does not pay: on accelerators, and before jax 0.12.
+    `block`: this many runs go through all steps before the next ones start, so that their numbers stay in the processor's
+    nearest cache: with 64 of 1000 runs a step of a 7-DOF car takes 109 ns instead of 126 ns (float64), with 128 runs 112 ns, with
+    32 runs 138 ns. Every array (N,) of x0 and args must then be one number per run, and none may be in the closure of `rates`.
+    Take a multiple of 64. Blocks are not used where they do not pay: on accelerators, and before jax 0.12.
 
-    Reverse mode keeps one state a row, and computes a row's steps again for their slopes: take `RolledRK4` for it, and give
-    every run its own numbers of what is differentiated (arrays (N,)), so that slopes are added side by side and summed once.
+    Reverse mode keeps one state per row and computes the steps of a row again for their slopes: take `RolledRK4` for it, and give
+    every run its own copy of the differentiated numbers (arrays (N,)), so that slopes are added side by side and summed once.
 
-    **Raises** `InputError` for a step that is not positive, less than one step or run a block, or blocks of an x0 that is not
-    of arrays (N,) of one length (or scalars: one run).
+    **Raises** `InputError` for a step that is not positive, for less than one step or one run per block, and for blocks with an
+    x0 that is not made of arrays (N,) of one length (or of scalars: one run).
     """
     check_positive("step", step, "s")
     for name, count in (("rows", rows), ("steps_a_row", steps_a_row), ("block", 1 if block is None else block)):
@@ -66,9 +66,9 @@ def fixed_steps(
         return run(x0, args)
     shapes = {jnp.shape(leaf) for leaf in leaves}
     if len(shapes) > 1 or len(next(iter(shapes))) > 1:
-        raise InputError(f"x0: shapes {sorted(shapes)}; in blocks all must be arrays (N,) of one length.")
+        raise InputError(f"x0: shapes {sorted(shapes)}; with a block all must be arrays (N,) of one length.")
     runs = np.size(leaves[0])
-    # Where a barrier does not hold, short arrays cost more than memory does.
+    # Where a barrier does not hold, short arrays cost more time than memory access does.
     return _in_blocks(run, x0, args, runs, block) if block < runs and on_cpu() and barriers_hold() else run(x0, args)
 
 
@@ -77,7 +77,7 @@ def _states(rates, x0, args, begin, solver, *, rows: int, step: float, steps_a_r
     term = diffrax.ODETerm(rates)
 
     def time(count):
-        # Counted, not summed up: a sum of thousands of steps drifts in single precision.
+        # The time is counted, not summed: a sum of thousands of steps drifts in single precision.
         return begin + jnp.asarray(step, begin.dtype) * count.astype(begin.dtype)
 
     def one_step(carry, _):
@@ -96,7 +96,7 @@ def _states(rates, x0, args, begin, solver, *, rows: int, step: float, steps_a_r
 
 
 def _in_blocks(run, x0, args, runs: int, block: int):
-    """`run(x0, args)` of `block` runs after the other; leaves (runs,) are cut, all others belong to every run."""
+    """`run(x0, args)` for one block of runs after the other; leaves (runs,) are cut, all others belong to every run."""
     blocks = -(-runs // block)
     leaves, tree = jax.tree.flatten((x0, args))
     cut = [i for i, leaf in enumerate(leaves) if np.shape(leaf) == (runs,)]

@@ -1,4 +1,4 @@
-"""What programs over `simulate` ask for."""
+"""Names for programs that call `simulate`."""
 
 from jaxveh.simulation.simulate import SOLVERS
 

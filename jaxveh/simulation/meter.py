@@ -1,4 +1,4 @@
-"""How far a simulation has come, told while it runs."""
+"""The progress of a simulation, reported while it runs."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ import numpy as np
 from jaxveh._core.progress import Progress, silent
 
 LEAST = 0.01
-"""Share of a simulation after which it is told again."""
+"""Share of a simulation after which progress is reported again."""
 
 _listeners: list[Progress] = []
-"""Who listens now: kept out of the compiled program, which is the same whoever does."""
+"""The listeners at present: kept out of the compiled program, so that one program serves any of them."""
 
 
 class Meter(diffrax.AbstractProgressMeter):
-    """Tells the listener of `meter_for` how far a solve has come."""
+    """Reports the progress of a solve to the listener of `meter_for`."""
 
     def init(self):
         return jnp.zeros(())
@@ -42,7 +42,7 @@ def _tell(progress) -> None:
 
 @contextlib.contextmanager
 def meter_for(report: Progress) -> Iterator[diffrax.AbstractProgressMeter]:
-    """The meter for a solve that `report` hears of; none for `silent`."""
+    """The meter for a solve whose progress goes to `report`; none for `silent`."""
     if report is silent:
         yield diffrax.NoProgressMeter()
         return

@@ -1,4 +1,4 @@
-"""Simulate a drive: exact states, what the sensors say, the truth beside them."""
+"""Simulate a drive: exact states, the sensors' measurements, and the truth beside them."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ from jaxveh.vehicles import AbstractVehicle, Travelling
 SOLVERS = ("auto", "explicit", "implicit")
 
 SAME = 1e-9
-"""s: instants that differ by less are one."""
+"""s: instants that differ by less count as one."""
 
 ROUNDS = 3
-"""Runs at most until equal steps hold the fastest motion of what they show; after them the implicit method."""
+"""Most runs until equal steps hold the fastest motion of their result; after them the implicit method takes over."""
 
 
 REMEDY = (
-    ' Try solver = "implicit" or a shorter max_step; where it fails at the same time still, look at the car\'s parameters and '
-    "at what the driver does there. throw=False gives the rows."
+    ' Try solver = "implicit" or a shorter max_step. If it fails at the same time again, check the car\'s parameters and '
+    "the driver's inputs at that time. throw=False returns the rows."
 )
-"""What to do about a simulation that did not stay finite."""
+"""The remedy in the message about a simulation that did not stay finite."""
 
 
 def simulate(
@@ -60,28 +60,28 @@ def simulate(
 ) -> Recording:
     """Drive `car` through `manoeuvre` and record it: rows at 0, dt, 2 dt, ... up to the manoeuvre's duration.
 
-    **The drive**: `manoeuvre` is open-loop, or a driver who sees the car. A car with engine and brakes whose manoeuvre says a
-    speed and no pedals of its own gets a driver who holds it (`manoeuvres.SpeedControl`). `road` (`jaxveh.roads`) has friction
-    and slopes along the way (None: level). `start`: state fields that differ from straight running, by name (`{"yaw": 0.05}`),
-    world position `x`, `y` included. `until`: an event that ends the simulation early (`simulation.standstill()`); later rows
-    are cut off.
+    **The drive**: `manoeuvre` is open-loop, or a driver who sees the car. If the car has an engine and brakes and the manoeuvre
+    gives a speed but no pedals, a driver holds that speed (`manoeuvres.SpeedControl`). `road` (`jaxveh.roads`) has friction and
+    slopes along the way (None: level). `start`: state fields that differ from straight running, by name (`{"yaw": 0.05}`), also
+    the world position `x`, `y`. `until`: an event that ends the simulation early (`simulation.standstill()`); later rows are cut
+    off.
 
-    **Channels** with a `SensorSet` (or none): each measured channel by its name, with the sensors' noise, and the car's inputs
-    (`steer`, `v_x`, ...) exact unless the sensors measure them. With a `Suite` of devices (or one device): what they say, when
-    they say it (its rows instead of `dt`'s, NaN where a device was silent). In both the truth, every output of the car, as
-    `true.<name>`. `key` draws all randomness; without a key the measurements carry none.
+    **Channels** with a `SensorSet` (or without sensors): each measured channel by its name, with the sensors' noise, and the
+    car's inputs (`steer`, `v_x`, ...), exact unless the sensors measure them. With a `Suite` of devices (or one device): their
+    measurements at the instants when they arrive (rows at these instants instead of every `dt`; NaN where a device has none). In
+    both cases every output of the car as truth, `true.<name>`. `key` draws all randomness; without a key there is none.
 
-    **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened to what the fastest
-    motion asks for (the spins of wheels at low speed, a sensor's low-pass, the driver), or Kvaerno's implicit method where
-    they would become too short; "explicit" and "implicit" insist, and a warning says where equal steps were too long for what
-    happened. A diffrax solver takes equal steps, or its own with a `stepsize_controller`. Under jit, vmap or grad nothing can
-    be looked at: "auto" is then "explicit". `adjoint`: diffrax's way to differentiate; the default serves reverse mode, and
-    forward mode too where steps are equal and no event ends them (else `diffrax.ForwardMode()`). `progress` hears how far it
-    is (single runs). All may be jitted, vmapped over keys, cars and manoeuvres, and differentiated by any of their leaves.
+    **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened as the fastest motion
+    requires (wheel spins at low speed, a sensor's low-pass, the driver), or Kvaerno's implicit method where the steps would be
+    too short. "explicit" and "implicit" are always obeyed; a warning says where equal steps were too long for the motion. A
+    diffrax solver takes equal steps, or its own with a `stepsize_controller`. Under jit, vmap or grad values cannot be checked:
+    "auto" is then "explicit". `adjoint`: diffrax's way to differentiate; the default serves reverse mode, and also forward mode
+    with equal steps and no event (otherwise `diffrax.ForwardMode()`). `progress` gets the share done (single runs). All of it may
+    be jitted, vmapped over keys, cars and manoeuvres, and differentiated by any of their leaves.
 
-    **Raises** `InputError` for arguments out of range, sensors or an event that are none, a manoeuvre that lacks an input of
-    the car, rows that are one instant in the car's dtype; `FilterError`, naming time, state and a remedy, where the motion does
-    not stay finite. The latter needs `throw=True` and acts on the host; under jit look at the channels.
+    **Raises** `InputError` for arguments out of range, sensors or an event of a wrong type, a manoeuvre without an input that the
+    car needs, rows that coincide in the car's dtype; `FilterError`, with time, state and a remedy, if the motion does not stay
+    finite. The latter needs `throw=True` and runs on the host; under jit check the channels.
     """
     sensors = _suite_of(sensors)
     _check_event(until)
@@ -104,7 +104,7 @@ def simulate(
 
 
 def _suite_of(sensors: Any) -> SensorSet | Suite | None:
-    """The sensors, one device as a suite; raises for what are none."""
+    """The sensors, one device as a suite. Raises `InputError` for anything else."""
     if isinstance(sensors, AbstractDevice):
         return Suite(sensors)
     if sensors is None or isinstance(sensors, SensorSet | Suite):
@@ -123,14 +123,14 @@ def _check_event(until: Any) -> None:
 
 
 def _describe(what: Any) -> str:
-    """A short word for what does not belong where it is."""
+    """A short word for an argument of a wrong type."""
     if isinstance(what, str):
         return repr(what)
     return getattr(what, "__name__", type(what).__name__)
 
 
 def driven_car(car: AbstractVehicle, manoeuvre: Any, sensors: SensorSet | None = None, road: Any = None) -> Driven:
-    """The car on its road with sensors and driver, as `simulate` integrates it; raises `InputError` where they do not fit."""
+    """The car on its road with sensors and driver, as `simulate` integrates it. Raises `InputError` if they do not fit."""
     placed = _place_on_road(car, road)
     driven = Driven(Instrumented(placed, sensors), with_pedals(manoeuvre, placed))
     check_inputs(driven)
@@ -138,7 +138,7 @@ def driven_car(car: AbstractVehicle, manoeuvre: Any, sensors: SensorSet | None =
 
 
 def _place_on_road(car: AbstractVehicle, road: Any) -> Travelling:
-    """The car with its place on its road: that of `car` itself, or `road`."""
+    """The car with its position on its road: the road of `car` itself, or `road`."""
     if not isinstance(car, Travelling):
         _check_not_placed(car)
         return Travelling(car, road)
@@ -164,21 +164,19 @@ def _check_not_placed(car: AbstractVehicle) -> None:
 
 
 def _choice(solver, controller, max_step) -> SolverChoice | None:
-    """What the caller insists on; None for "auto"."""
+    """The solver that the caller asks for; None for "auto"."""
     if not isinstance(solver, str):
         return SolverChoice(solver, controller, max_step)
     check_one_of("solver", solver, SOLVERS)
     if controller is not None:
-        raise InputError(
-            f'solver = "{solver}" with a stepsize_controller: name the diffrax solver that it shall control.'
-        )
+        raise InputError(f'solver = "{solver}" with a stepsize_controller: give the diffrax solver that it controls.')
     if solver == "auto":
         return None
     return stiffness.explicit(max_step) if solver == "explicit" else stiffness.implicit(max_step)
 
 
 def _run(driven: Driven, values: dict, run, asked: SolverChoice | None, times: np.ndarray, max_step: float) -> Solution:
-    """Run as asked; on "auto" look at the fastest motion before and after, and run again where steps were too long."""
+    """Run as asked; on "auto" check the fastest motion before and after, and run again where steps were too long."""
     looks = is_concrete(driven, values) and stiffness.may_be_stiff(driven, max_step)
     if asked is not None or not looks:
         choice = stiffness.explicit(max_step) if asked is None else asked
@@ -195,7 +193,7 @@ def _run(driven: Driven, values: dict, run, asked: SolverChoice | None, times: n
         if not pole * choice.max_step > stiffness.LIMIT:
             return found
         choice = stiffness.choose(pole, max_step)
-    # Shorter and shorter steps have shown faster and faster motions: no guess is left.
+    # Shorter and shorter steps have shown faster and faster motions: there is no better guess.
     return run(stiffness.implicit(max_step))
 
 
@@ -204,8 +202,8 @@ def _warn_of_long_steps(driven: Driven, found: Solution, choice: SolverChoice, t
     pole, time = stiffness.worst(driven, times, found.x, found.u)
     if pole * choice.max_step > limit:
         warnings.warn(
-            f"simulate: steps of {choice.max_step:g} s are too long for a motion of {pole:.0f} 1/s at t = {time:g} s, so what is "
-            f'seen there may be ringing of the solver: take max_step = {stable / pole:.2g} s, or solver = "auto".',
+            f"simulate: steps of {choice.max_step:g} s are too long for a motion of {pole:.0f} 1/s at t = {time:g} s; the result "
+            f'there may be ringing of the solver. Take max_step = {stable / pole:.2g} s, or solver = "auto".',
             JaxvehWarning,
             stacklevel=4,
         )
@@ -245,7 +243,7 @@ def _recording(driven: Driven, found: Solution, times: np.ndarray, key, source: 
 
 
 def _inputs(driven: Driven, found: Solution) -> dict:
-    """The car's inputs; what the driver does not say outright is among the outputs."""
+    """The car's inputs; those that the driver does not give are among the outputs."""
     u, outputs = found.u._asdict(), found.outputs._asdict()
     return {name: u[name] if name in u else outputs[name] for name in driven.car.inputs}
 
@@ -256,16 +254,16 @@ def _units(driven: Driven, channels: Mapping) -> dict:
 
 
 def device_rows(suite: Suite, duration: float) -> np.ndarray:
-    """The instants from 0 on at which a device of the suite speaks, or at which one looks (s); the end where there is but one."""
+    """The instants from 0 on at which a device of the suite samples or reports (s); with only one instant also the end."""
     every = np.unique(np.concatenate([[0.0], suite.sample_times(duration), suite.look_times(duration)]))
-    # What differs by rounding alone is one instant.
+    # Instants that differ only by rounding are one.
     rows = every[np.concatenate([[True], np.diff(every) > SAME])]
-    # A drive has a beginning and an end, however seldom a device speaks.
+    # A drive has a beginning and an end, however rarely a device reports.
     return rows if len(rows) > 1 else np.append(rows, duration)
 
 
 def _devices(driven: Driven, found: Solution, rows: np.ndarray, suite: Suite, duration, key, source):
-    """What the devices say, with the truth, at the instants when any of them speaks; and which of `rows` those are."""
+    """The devices' measurements, with the truth, at the instants of any device; and the indices of these instants in `rows`."""
     truth = {**_inputs(driven, found), **found.outputs._asdict()}
     times, said, units = suite.record(rows, truth, duration, key)
     at = np.clip(np.searchsorted(rows, times - SAME), 0, len(rows) - 1)
@@ -274,7 +272,7 @@ def _devices(driven: Driven, found: Solution, rows: np.ndarray, suite: Suite, du
 
 
 def _cut(recording: Recording, row: np.ndarray, found: Solution, until: Event | None) -> Recording:
-    """Without the rows after an event, and with a word about it; under jit they stay, as NaN. `row`: of the solution."""
+    """The recording without the rows after an event, named in its source; under jit they stay, as NaN. `row`: of the solution."""
     if until is None or not is_concrete(found) or not bool(found.event):
         return recording
     reached = int(np.sum(row < int(found.reached)))

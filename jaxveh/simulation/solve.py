@@ -1,4 +1,4 @@
-"""One simulation through diffrax: states at the rows, and what became of it."""
+"""One simulation through diffrax: states at the rows, and the result code."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from jaxveh.simulation.stiffness import SolverChoice
 from jaxveh.statespace import RK4, Heun, RolledRK4
 
 ADAPTIVE_STEPS_A_ROW = 64
-"""Steps that a solver with steps of its own may take, times the rows and equal steps of the longest length."""
+"""Most steps of a solver with its own step size, as a multiple of the number of equal steps of the greatest length."""
 
 TOLD_FROM = 50_000
-"""Equal steps from which on a simulation tells how far it is: fewer take a second at most, and jax keeps no compiled program that
-talks to its host."""
+"""Number of equal steps from which on a simulation reports its progress: fewer take at most a second, and jax caches no compiled
+program that calls its host."""
 
 
 class Solution(NamedTuple):
-    """What a simulation gives by row, each leaf (T,): states, inputs, outputs, noise-free measurements; and as scalars the
-    `result` code (`Result`), the time `end` (s) at which it ended, whether an `event` ended it, and how many rows it `reached`.
-    Rows after an event are NaN."""
+    """A simulation by row, each leaf (T,): states, inputs, outputs, noise-free measurements; and as scalars the `result` code
+    (`Result`), the time `end` (s) at which it ended, whether an `event` ended it, and how many rows it `reached`. Rows after an
+    event are NaN."""
 
     x: Any
     u: Any
@@ -45,14 +45,14 @@ class Solution(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Instants of the rows `rows` (s) and of the ends of equal steps between them `steps` (s), both from 0 up."""
+    """Instants of the rows, `rows` (s), and the ends of equal steps between them, `steps` (s); both start at 0."""
 
     rows: np.ndarray
     steps: np.ndarray
 
     @property
     def steps_a_row(self) -> int | None:
-        """How many steps lie between two rows, None where that is not always the same."""
+        """The number of steps between two rows; None if it varies."""
         if len(self.rows) < 2:
             return None
         each, left = divmod(len(self.steps) - 1, len(self.rows) - 1)
@@ -65,7 +65,7 @@ def even_grid(duration: float, dt: float, max_step: float) -> Grid:
     check_positive("dt", dt, "s")
     check_positive("max_step", max_step, "s")
     check("dt", dt, lambda v: v <= duration, f"at most the manoeuvre's duration, {duration:g} s")
-    # A duration that is a whole number of steps but for rounding keeps its last row.
+    # A duration that is a whole number of steps except for rounding keeps its last row.
     count = math.floor(duration / dt + 1e-9)
     rows = dt * np.arange(count + 1)
     return Grid(rows, np.linspace(0.0, rows[-1], count * math.ceil(dt / max_step - 1e-9) + 1))
@@ -92,7 +92,7 @@ def solve(
 ) -> Solution:
     """Simulate the driven car over the grid. It may be jitted, vmapped and differentiated.
 
-    **Raises** `InputError` for instants that are one in the car's dtype.
+    **Raises** `InputError` for instants that coincide in the car's dtype.
     """
     dtype = dtype_of(driven.car.vehicle)
     _check_distinct("rows", grid.rows, dtype)
@@ -109,13 +109,13 @@ def solve(
 
 
 def _check_distinct(what: str, instants: np.ndarray, dtype) -> None:
-    """Raise where two instants that follow each other are no longer apart in the car's dtype."""
+    """Raise `InputError` if two successive instants coincide in the car's dtype."""
     rounded = instants.astype(dtype)
     same = rounded[1:] <= rounded[:-1]
     if same.any():
         first, second = instants[np.argmax(same) :][:2]
         raise InputError(
-            f"simulate: the {what} at t = {first:.9g} s and {(second - first):.3g} s later are one instant in {np.dtype(dtype)}: "
+            f"simulate: the {what} at t = {first:.9g} s and {(second - first):.3g} s later coincide in {np.dtype(dtype)}: "
             "take a car in float64 (jax_enable_x64), longer steps, or rates and delays whose instants lie farther apart."
         )
 
@@ -125,14 +125,14 @@ def _rates(t, x, driven: Driven):
 
 
 SCANNED = (RK4, RolledRK4, Heun)
-"""Solvers whose equal steps are a `lax.scan`: explicit, without a memory."""
+"""Solvers whose equal steps run as a `lax.scan`: explicit ones without a memory."""
 
 
 @eqx.filter_jit
 def _scan(driven: Driven, start, rows, steps, solver, each: int, meter) -> Solution:
-    """What `_solve` does with the same steps, without what they do not need of `diffeqsolve`.
+    """The same steps as in `_solve`, without the parts of `diffeqsolve` that they do not need.
 
-    About as fast; but forward mode works, and reverse mode keeps one state a row.
+    About as fast; but forward mode works, and reverse mode keeps one state per row.
     """
     term, count = diffrax.ODETerm(_rates), len(rows) - 1
     y0 = driven.start(rows[0], rows.dtype, **start)
@@ -181,7 +181,7 @@ def _solve(driven: Driven, start, rows, steps, solver, controller, until, adjoin
     ys: Any = solution.ys
     x, (end,) = ys
     event = solution.result == diffrax.RESULTS.event_occurred
-    # The last row is reached where nothing stopped the solver, whatever rounding makes of the end.
+    # If nothing stopped the solver, the last row is reached, however the end is rounded.
     reached = (rows <= end) | (solution.result == diffrax.RESULTS.successful)
     if until is not None:
         x = jax.tree.map(lambda leaf: jnp.where(reached, leaf, jnp.nan), x)
@@ -190,8 +190,8 @@ def _solve(driven: Driven, start, rows, steps, solver, controller, until, adjoin
 
 
 def _solution(driven: Driven, rows, x, end, event, reached, ended) -> Solution:
-    """The solution of states at the rows."""
-    # Row by row, not as a batch: as quick for some hundred rows, and compiled in a third of the time.
+    """The solution for given states at the rows."""
+    # Row by row, not as a batch: as fast for some hundred rows, and compiled in a third of the time.
     u, outputs, measured = jax.lax.map(lambda at: driven.see(*at), (rows, x))
     result = _result(ended, x, outputs, reached)
     return Solution(x, u, outputs, measured, result, end, event, jnp.sum(reached))

@@ -1,4 +1,4 @@
-"""How fast the fastest motion of a simulated car is, and which solver that asks for."""
+"""The fastest motion of a simulated car, and the solver that it requires."""
 
 from __future__ import annotations
 
@@ -16,38 +16,39 @@ from jaxveh.simulation.driven import Driven, DrivenState, dtype_of
 from jaxveh.statespace import RolledRK4
 
 STABLE = 2.5
-"""Step times fastest pole up to which RK4 decays with it: it ends at 2.79 on the real, at 2.83 on the imaginary axis."""
+"""Step times fastest pole up to which RK4 decays with it; its limit is 2.79 on the real and 2.83 on the imaginary axis."""
 
 LIMIT = 2.75
 """Step times fastest pole beyond which RK4 grows or rings."""
 
 LEAST_STEP = 2.5e-4
-"""s: below it an implicit solver is the cheaper one."""
+"""s: for shorter steps an implicit solver is cheaper."""
 
 SETTLING = 24
-"""Iterations that turn to the fastest motion; as many again measure it."""
+"""Iterations in which the vector turns to the fastest motion; as many again measure it."""
 
 LEAST_SIZE = 1e-30
 
 LOOKS = 16
-"""Rows of a simulation that are looked at."""
+"""Number of rows of a simulation that are checked."""
 
 
 SLOW = {
     *("x", "y", "z", "yaw", "roll", "pitch", "v_x", "v_y", "v_z", "yaw_rate", "roll_rate", "pitch_rate", "sideslip"),
     *("a_x_felt", "a_y_felt", "steer", "speed", "hitch"),
 }
-"""States whose poles stay below `SLOW_POLE` in any car; spins, wheel travels and tyre deflections may not."""
+"""States whose poles stay below `SLOW_POLE` in any car; those of spins, wheel travels and tyre deflections may be faster."""
 
 SLOW_POLE = 1000.0
-"""1/s: some hundred at walking speed, and room."""
+"""1/s: several hundred at walking speed, with a margin."""
 
 
 def limits(solver: Any) -> tuple[float, float]:
-    """The largest pole times step that equal steps of a solver bear, and what is well inside; infinite of an implicit one.
+    """The largest product of pole and step for which equal steps of a solver are stable, and one well inside; both are infinite
+    for an implicit solver.
 
-    Explicit rules of one or two stages bear 2, those with more stages at least what RK4 does (E. Hairer and G. Wanner, Solving
-    Ordinary Differential Equations II, sec. IV.2).
+    Explicit methods of one or two stages allow 2, those with more stages at least as much as RK4 (E. Hairer and G. Wanner,
+    Solving Ordinary Differential Equations II, sec. IV.2).
     """
     if isinstance(solver, diffrax.AbstractImplicitSolver):
         return math.inf, math.inf
@@ -56,8 +57,8 @@ def limits(solver: Any) -> tuple[float, float]:
 
 
 class SolverChoice(NamedTuple):
-    """How `solve` integrates: the `solver` (one of diffrax) with equal steps of at most `max_step` (s), or with a `controller` of
-    diffrax that chooses its own (None: equal steps)."""
+    """How `solve` integrates: `solver` (one of diffrax) takes equal steps of at most `max_step` (s), unless a diffrax
+    `controller` chooses the steps (None: equal steps)."""
 
     solver: diffrax.AbstractSolver
     controller: diffrax.AbstractStepSizeController | None
@@ -68,7 +69,7 @@ def fastest_pole(driven: Driven, t: Any, x: Any) -> jax.Array:
     """The spectral radius of the Jacobian of car, driver and sensors at one instant, 1/s, within a few per cent.
 
     By power iteration with Jacobian-vector products: the mean growth over its second half, which is that of the largest
-    eigenvalue, real or a complex pair. The sensors' low-pass listens and acts on nothing: its poles are its own.
+    eigenvalue, real or a complex pair. The sensors' low-pass does not act on the car, so its poles are taken separately.
     """
     bare = Driven(Instrumented(driven.car.vehicle), driven.driver)
     moving = DrivenState(driven.car.split(x.car)[0], x.driver)
@@ -81,25 +82,25 @@ def fastest_pole(driven: Driven, t: Any, x: Any) -> jax.Array:
         grown = grown + jnp.where(i < SETTLING, 0.0, jnp.log(size))
         return jax.tree.map(lambda leaf: leaf / size, v), grown
 
-    # A start with a share in every direction.
+    # A start with a component in every direction.
     start = jax.tree.map(lambda leaf: jnp.cos(1.0 + jnp.abs(leaf)), moving)
     _, grown = jax.lax.fori_loop(0, 2 * SETTLING, step, (start, jnp.zeros_like(start.car[0])))
     return jnp.maximum(jnp.exp(grown / SETTLING), jnp.asarray(sensors_pole(driven), grown.dtype))
 
 
 def sensors_pole(driven: Driven) -> Any:
-    """The poles of the sensors' low-pass, all of one size, 1/s; 0 without."""
+    """The poles of the sensors' low-pass, all of one size, 1/s; 0 without a low-pass."""
     sensors = driven.car.sensors
     return 0.0 if sensors is None or sensors.low_pass is None else sensors.low_pass.omega
 
 
 def may_be_stiff(driven: Driven, max_step: float) -> bool:
-    """Whether steps of `max_step` (s) may be too long for something: the car has states of which it cannot be told by name that
-    they are slow enough, or its sensors or its driver are not."""
+    """Whether steps of `max_step` (s) may be too long: the car has states whose names do not show that they are slow enough, or
+    its sensors or its driver are fast."""
     rate = driven.driver.fastest_rate
     if rate is None or not set(driven.car.vehicle.state_type._fields) <= SLOW:
         return True
-    # The driver's rate is a rough one, and the car's answer is in it.
+    # The driver's rate is approximate, and includes the response of the car.
     known = max(SLOW_POLE, float(np.max(sensors_pole(driven))), 2.0 * float(np.max(rate)))
     return known * max_step > LIMIT
 
@@ -108,7 +109,7 @@ def at_start(driven: Driven, values: dict, times: np.ndarray) -> float:
     """The fastest pole at the start, 1/s."""
     dtype = dtype_of(driven.car.vehicle)
     x = driven.start(jnp.asarray(times[0], dtype), dtype, **values)
-    # As many rows as are looked at later: one compilation serves both.
+    # As many rows as are checked later: one compilation serves both.
     many = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (LOOKS + 1,)), x)
     return float(fastest_poles(driven, jnp.full(LOOKS + 1, times[0], dtype), many)[0])
 
@@ -117,11 +118,11 @@ def at_start(driven: Driven, values: dict, times: np.ndarray) -> float:
 def fastest_poles(driven: Driven, t: Any, x: Any) -> jax.Array:
     """The fastest pole at each row: t (n,), the leaves of x (n,).
 
-    Beside the row's state also at straight rolling with the row's speed (the driver's, of a car that is told it): there tyres
-    are at their stiffest. Where equal steps were too long, the wheels ring up to where the tyres slide, and a look at the
-    sliding state alone would find nothing.
+    Also at straight rolling with the row's speed (the driver's speed for a car whose speed is an input): there the tyres are
+    stiffest. Where equal steps were too long, the wheels ring until the tyres slide, and a check of the sliding state alone would
+    find nothing.
     """
-    # In turn, not as a batch: a few rows are quick, and it compiles in half the time.
+    # In turn, not as a batch: fast for a few rows, and compiled in half the time.
     pole = lambda t, x: jax.lax.map(lambda at: fastest_pole(driven, *at), (t, x))
     dtype = x.car[0].dtype
     if "v_x" in x.car._fields:
@@ -133,14 +134,14 @@ def fastest_poles(driven: Driven, t: Any, x: Any) -> jax.Array:
 
 
 def sample_rows(x: Any, u: Any) -> np.ndarray:
-    """The rows of a simulation that are looked at: evenly from first to last, and the slowest."""
+    """The rows of a simulation that are checked: evenly from first to last, and the slowest."""
     speed = np.abs(np.asarray(getattr(x.car, "v_x", getattr(u, "v_x", x.car[0]))))
     even = np.linspace(0, len(speed) - 1, LOOKS).round().astype(int)
     return np.append(even, np.argmin(np.where(np.isfinite(speed), speed, np.inf)))
 
 
 def worst(driven: Driven, times: np.ndarray, x: Any, u: Any) -> tuple[float, float]:
-    """The fastest pole (1/s) over some rows of a simulation, and its time (s); rows that are not finite are left out."""
+    """The fastest pole (1/s) over the checked rows of a simulation, and its time (s); rows that are not finite are skipped."""
     some = sample_rows(x, u)
     at = jax.tree.map(lambda leaf: leaf[some], x)
     found = np.asarray(fastest_poles(driven, jnp.asarray(times[some], dtype_of(driven.car.vehicle)), at))
@@ -157,11 +158,11 @@ def explicit(max_step: float) -> SolverChoice:
 
 
 def implicit(max_step: float, rtol: float = 1e-6, atol: float = 1e-7) -> SolverChoice:
-    """Kvaerno's stiff method of fifth order (2004) with steps of its own."""
+    """Kvaerno's stiff method of fifth order (2004) with adaptive steps."""
     return SolverChoice(diffrax.Kvaerno5(), diffrax.PIDController(rtol=rtol, atol=atol, dtmax=0.05), max_step)
 
 
 def choose(pole: float, max_step: float) -> SolverChoice:
-    """RK4 with steps that hold the fastest pole, or where they would be shorter than `LEAST_STEP` the implicit method."""
+    """RK4 with steps short enough for the fastest pole; if they were shorter than `LEAST_STEP`, the implicit method."""
     step = min(max_step, STABLE / pole) if np.isfinite(pole) and pole > 0 else max_step
     return explicit(step) if step >= LEAST_STEP else implicit(max_step)

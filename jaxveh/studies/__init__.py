@@ -1,6 +1,6 @@
-"""Studies as files: cars, manoeuvres, sensors, estimators, filters and metrics by name, swept over what varies.
+"""Studies as files: cars, manoeuvres, sensors, estimators, filters and metrics by name, swept over the varied settings.
 
-`figures` is imported when it is asked for: it needs matplotlib, the extra `plot`.
+`figures` is imported on first use: it needs matplotlib, the extra `plot`.
 """
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""What a study varies: lists of numbers or of names, ranges, samples; as the axes of a sweep's design."""
+"""The varied settings of a study: lists of numbers or names, ranges, samples; as the axes of a sweep's design."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ METHODS = {"latin-hypercube": latin_hypercube, "sobol": sobol}
 SCALES = ("linear", "log")
 
 TRACED = ("car.", "told.", "sensors.", "process_noise.", "measurement_noise.", "drive.speed", "drive.steer_deg")
-"""What varies within one program; of everything else each value is a program of its own."""
+"""Settings that vary within one program; for all others each value is a program of its own."""
 
 STILL = "sensors.devices"
-"""What does not, though it begins so."""
+"""The exception: it begins like a traced path, but its values are programs of their own."""
 
 
 class Varied(NamedTuple):
-    """One axis: its name in results, the `path` of what it varies in the study (None: the samples'), its values."""
+    """One axis: its name in results, the `path` of the varied setting in the study (None: the samples), its values."""
 
     name: str
     path: str | None
@@ -40,14 +40,14 @@ def field_of(path: str) -> str:
 
 
 def is_traced(path: str) -> bool:
-    """Whether what stands at a path varies within one program."""
+    """Whether the setting at a path varies within one program."""
     return path.startswith(TRACED) and path != STILL
 
 
 def axes_of(vary: Mapping[str, Any]) -> tuple[Varied, ...]:
     """The axes of a study's table `vary`.
 
-    **Raises** `InputError` for what is neither a list, a range, a table of labels nor samples.
+    **Raises** `InputError` for anything but a list, a range, a table of labels or samples.
     """
     found = []
     for path, told in _paths(vary):
@@ -58,7 +58,7 @@ def axes_of(vary: Mapping[str, Any]) -> tuple[Varied, ...]:
     names = [one.name for one in found]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"vary: {name} twice: give each once.")
+            raise InputError(f"vary: {name} is there twice: give each setting once.")
     return tuple(found)
 
 
@@ -68,7 +68,7 @@ def design_of(axes: tuple[Varied, ...]) -> Design:
 
 
 def _paths(vary: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
-    """The varied paths, nested tables or dotted keys, down to lists, ranges and tables of labels."""
+    """The varied paths: nested tables or dotted keys down to lists, ranges and tables of labels."""
     found = []
     for key, told in vary.items():
         path = f"{before}{key}"
@@ -98,7 +98,7 @@ def _values(path: str, told: Any, traced: bool) -> Any:
         return [kit.toml_number(where, value) for value in told]
     labels = [str(value) for value in told]
     if len(set(labels)) < len(labels):
-        raise InputError(f"{where} = {told!r}: has a value twice.")
+        raise InputError(f"{where} = {told!r}: has a value twice; give each value once.")
     return dict(zip(labels, told, strict=True))
 
 
@@ -138,9 +138,7 @@ def _samples(told: Any) -> Samples:
     ranges = flat(told.get("ranges", {}))
     for path in ranges:
         if not is_traced(path):
-            raise InputError(
-                f"{where}.ranges: {path} cannot vary within one program; give it a list of its own in [vary]."
-            )
+            raise InputError(f"{where}.ranges: {path} cannot vary within one program; give it its own list in [vary].")
     return METHODS[method](
         told.get("count", 64), seed=seed, **{field_of(path): tuple(ends) for path, ends in ranges.items()}
     )

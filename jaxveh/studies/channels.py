@@ -1,4 +1,4 @@
-"""What an estimator reads of a recording: channels by its own names, and inputs known in every row."""
+"""The channels that an estimator reads from a recording, under its own names, with inputs known in every row."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from jaxveh.io import kit
 
 
 def renamed_channels(recording: Recording, names: Mapping[str, Any]) -> Recording:
-    """The recording with further channels: what the estimator calls a channel, and which of the recording it is.
+    """The recording with further channels. `names`: the estimator's name of a channel to its name in the recording.
 
-    **Raises** `InputError` for one that is not there.
+    **Raises** `InputError` for a channel that is not in the recording.
     """
     for name in names.values():
         kit.check_known("channels", "recorded channel", str(name), recording.names)
@@ -23,13 +23,13 @@ def renamed_channels(recording: Recording, names: Mapping[str, Any]) -> Recordin
 
 
 def hold(recording: Recording, names: Iterable[str]) -> Recording:
-    """Those of the channels that are there, each row with the last value that a device has said, NaN no more; before the first
-    it is the first."""
+    """The recording with these channels held from row to row, as far as it has them: each row has the last measured value, and
+    the rows before the first measurement have the first one."""
     return recording.replace(**{name: _last_known(recording[name]) for name in names if name in recording})
 
 
 def _last_known(values: Any) -> Any:
-    """(T,) without gaps; NaN where nothing is known at all."""
+    """(T,) without gaps; NaN if there is no measurement at all."""
     values = jnp.asarray(values)
     known = ~jnp.isnan(values)
     last = jax.lax.cummax(jnp.where(known, jnp.arange(len(values)), -1))

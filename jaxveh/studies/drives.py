@@ -1,4 +1,4 @@
-"""The drives of a study: a car, its manoeuvre, road and sensors out of the study's tables."""
+"""The drives of a study: a car, its manoeuvre, road and sensors, made from the study's tables."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from jaxveh.studies.settings import OF_DRIVE, check_drive, speed_and_steer
 
 
 class Drive(NamedTuple):
-    """What is simulated: the true `car`, who drives it, what measures, on which road (None: level), rows every `dt` s."""
+    """A drive to simulate: the true `car`, its `driver`, the `sensors`, the `road` (None: level), rows every `dt` (s)."""
 
     car: Any
     driver: Any
@@ -27,7 +27,7 @@ class Drive(NamedTuple):
 
 
 def car_of(vehicle: str | CarSpecification, fidelity: str) -> vehicles.AbstractVehicle:
-    """The car of a name in `vehicles.kit.CARS`, or of a file, at a fidelity."""
+    """The car of this name in `vehicles.kit.CARS`, or of a file, at a fidelity."""
     kit.check_known("fidelity", "fidelity", fidelity, vehicles.kit.FIDELITIES)
     if isinstance(vehicle, CarSpecification):
         return vehicles.specified_car(vehicle, fidelity)
@@ -35,7 +35,7 @@ def car_of(vehicle: str | CarSpecification, fidelity: str) -> vehicles.AbstractV
 
 
 def specification_of(vehicle: str | CarSpecification) -> CarSpecification:
-    """What the file of a car says, of one by name what its file would say."""
+    """The content of a car's file; for a car by name, the content that its file would have."""
     if isinstance(vehicle, CarSpecification):
         return vehicle
     kit.check_known("vehicle", "car", vehicle, vehicles.kit.CARS)
@@ -44,10 +44,10 @@ def specification_of(vehicle: str | CarSpecification) -> CarSpecification:
 
 
 def drive_of(settings: Mapping[str, Any], key: jax.Array, duration: float | None = None) -> Drive:
-    """The drive that the tables say. `key` draws the driver and the road, where they are random; `duration` (s) holds where the
-    file says none.
+    """The drive that the tables describe. `key` draws the driver and the road, where they are random; `duration` (s) is the
+    duration if the file has none.
 
-    The driver and the devices are made for the car as its file has it, before `car` changes its numbers.
+    The driver and the devices are made for the car as its file describes it, before `car` changes its numbers.
     """
     drive = settings["drive"]
     check_drive(drive)
@@ -71,19 +71,20 @@ def drive_of(settings: Mapping[str, Any], key: jax.Array, duration: float | None
 
 
 def sensors_of(told: Mapping[str, Any], car: Any) -> Any:
-    """What measures: for devices that take noise the other keys are standard deviations by channel; else numbers of theirs."""
+    """The sensors. If the devices take noise, the other keys are standard deviations by channel, otherwise numbers of the
+    devices."""
     numbers = {name: value for name, value in told.items() if name != "devices"}
     check_one_of("sensors.devices", told["devices"], sensors.DEVICES)
     if sensors.DEVICES[told["devices"]].takes_noise:
         return sensors.named_devices(told["devices"], car, numbers)
     found = sensors.named_devices(told["devices"], car)
     if found is None and numbers:
-        raise InputError(f'sensors: {", ".join(numbers)} of devices that measure nothing; take devices = "esc".')
+        raise InputError(f'sensors: {", ".join(numbers)} belong to devices that measure nothing; take devices = "esc".')
     return with_numbers("sensors", found, flat(numbers))
 
 
 def simulate(drive: Drive, key: jax.Array) -> Recording:
-    """The recording, with the truth beside it; a drive that fails has NaN."""
+    """The recording, with the truth beside it; a drive that fails contains NaN."""
     return simulation.simulate(
         drive.car, drive.driver, drive.sensors, key, road=drive.road, dt=drive.dt, solver="explicit", throw=False
     )

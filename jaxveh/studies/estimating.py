@@ -1,4 +1,4 @@
-"""Estimators by name: the state space of any vehicle of the package, and what is ready-made of `jaxveh.estimators`."""
+"""Estimators by name: the state space of any vehicle of the package, and the ready-made ones of `jaxveh.estimators`."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from jaxveh.studies.settings import speed_and_steer
 
 
 class NamedEstimator(NamedTuple):
-    """How to make the estimator's own car out of the study's tables, and a state space of that car; what a recording goes through
-    before its filter, inputs held from row to row; which keys it has."""
+    """How to make the estimator's own `car` from the study's tables, and a state-space `model` of that car; how to `clean` a
+    recording for its filter, with inputs held from row to row; the `options` (its keys); and a line of `help`."""
 
     car: Callable[[Mapping[str, Any]], Any]
     model: Callable[[Any, Mapping[str, Any], Drive], StateSpace]
@@ -34,7 +34,7 @@ def estimator_of(settings: Mapping[str, Any]) -> NamedEstimator:
     """The estimator that the tables name."""
     told = settings["estimator"]
     if not isinstance(told.get("name"), str):
-        raise InputError(f"estimator: name is missing; it is one of {', '.join(ESTIMATORS)}.")
+        raise InputError(f"estimator: name is missing; it must be one of {', '.join(ESTIMATORS)}.")
     kit.check_known("estimator", "estimator", told["name"], ESTIMATORS)
     found = ESTIMATORS[told["name"]]
     for key in told:
@@ -43,13 +43,13 @@ def estimator_of(settings: Mapping[str, Any]) -> NamedEstimator:
 
 
 def told_car(settings: Mapping[str, Any]) -> Any:
-    """The estimator's own car: the file's, with the numbers of `told`."""
+    """The estimator's own car: that of the file, with the numbers of the table `told`."""
     return with_numbers("told", estimator_of(settings).car(settings), flat(settings["told"]))
 
 
 def model_of(settings: Mapping[str, Any], drive: Drive) -> StateSpace:
-    """The state space that the filter sees: it knows nothing of the table `car`, and of the drive the sensors' noise and the
-    first speed alone."""
+    """The filter's state space. It does not depend on the table `car`; of the drive it uses only the sensors' noise and the first
+    speed."""
     return estimator_of(settings).model(told_car(settings), settings, drive)
 
 
@@ -71,24 +71,26 @@ def _track_model(car: Any, settings: Mapping[str, Any], drive: Drive) -> StateSp
 
 
 def _as_told(settings: Mapping[str, Any], car: Any, devices: Any) -> sensors.SensorSet:
-    """The sensors as the filter takes them: with their own noise, or that of `measurement_noise`; without the inputs of its car,
-    which it takes as they are measured."""
+    """The sensors in the filter's model: with their own noise, or that of `measurement_noise`; without the inputs of its
+    car, which the model takes as measured."""
     told = dict(settings["measurement_noise"])
     if not isinstance(devices, sensors.SensorSet):
         if not told:
             raise InputError(
-                f"measurement_noise: devices = {settings['sensors']['devices']!r} do not say how noisy a filter shall take them: "
-                "give standard deviations by channel, [measurement_noise] yaw_rate = 0.005, a_y = 0.1."
+                f"measurement_noise: devices = {settings['sensors']['devices']!r} have no standard deviations for a filter: "
+                "give them by channel, [measurement_noise] yaw_rate = 0.005, a_y = 0.1."
             )
         return sensors.SensorSet(Gaussian(told))
     noise = {name: std for name, std in {**devices.noise.std._asdict(), **told}.items() if name not in car.inputs}
     if not noise:
-        raise InputError(f"sensors: measure nothing but inputs of {type(car).__name__} ({', '.join(car.inputs)}).")
+        raise InputError(
+            f"sensors: measure only inputs of {type(car).__name__} ({', '.join(car.inputs)}); add an output, as yaw_rate."
+        )
     return sensors.SensorSet(Gaussian(noise), devices.position, devices.low_pass)
 
 
 def where_of(names: Any, car: Any) -> Callable[[Any], list]:
-    """What picks the parameters of these dotted names of a car."""
+    """The function that picks the parameters of these dotted names from a car."""
     names = [names] if isinstance(names, str) else list(names)
     for name in names:
         kit.check_known("estimator.estimate", f"number of {type(car).__name__}", name, every_parameter(car))
@@ -96,15 +98,15 @@ def where_of(names: Any, car: Any) -> Callable[[Any], list]:
 
 
 def _ready_made(module: Any) -> NamedEstimator:
-    """An estimator of `jaxveh.estimators` (`estimators/contract.py`), at its word: neither calibrated nor smoothed."""
+    """An estimator of `jaxveh.estimators` (`estimators/contract.py`) with its defaults: neither calibrated nor smoothed."""
     options = [p.name for p in inspect.signature(module.model).parameters.values() if p.kind is p.KEYWORD_ONLY]
 
     def model(car: Any, settings: Mapping[str, Any], drive: Drive) -> StateSpace:
         for table in ("process_noise", "measurement_noise"):
             if settings[table]:
                 raise InputError(
-                    f"{table}: {module.NAME} has noises of its own; give {', '.join(options)} under [estimator], or its car's "
-                    "numbers under [told]."
+                    f"{table}: {module.NAME} has its own noises; give {', '.join(options)} under [estimator], or numbers of its "
+                    "car under [told]."
                 )
         return module.model(car, **{name: value for name, value in settings["estimator"].items() if name != "name"})
 

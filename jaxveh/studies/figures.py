@@ -1,4 +1,4 @@
-"""Figures of a sweep: lines over numbers, maps over two of them, violins, ranks, and errors over samples."""
+"""Figures of a sweep: lines over numbers, maps over pairs of numbers, violins, ranks, and errors over samples."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ MOST_PANELS = 6
 MOST_LINES = 6
 COLUMNS = 3
 MARKS = ("o-", "s--", "D:")
-"""So that lines upon each other are seen."""
+"""Markers and line styles that keep overlapping lines visible."""
 BINS = 10
-"""Of samples along each of their numbers."""
+"""Number of bins of the samples along each of their numbers."""
 
 SPREAD = 30.0
-"""Quotient of the 95th and the 5th percentile from which on errors are drawn on a logarithmic axis."""
+"""Ratio of the 95th to the 5th percentile from which on errors are drawn on a logarithmic axis."""
 
 
 def figures(found: Swept, values: Iterable[str] = ()) -> Iterator[tuple[str, Any]]:
-    """Name and figure of all that can be drawn of these values (default: the errors, or all where there is none)."""
+    """Name and figure of everything that can be drawn of these values (default: the errors, or all values if there are none)."""
     names = list(values) or errors_of(found, plain_values(found)) or plain_values(found)
     for name in plain_values(found, names):
         yield from _of_value(found, name)
@@ -50,7 +50,7 @@ def _of_value(found: Swept, name: str) -> Iterator[tuple[str, Any]]:
 
 
 def lines(found: Swept, name: str, axis: Axis, by: Axis | None = None) -> Any:
-    """A value over an axis of numbers: median and quartiles over everything else, a line for each label of `by`."""
+    """A value over an axis of numbers: median and quartiles over everything else, one line for each label of `by`."""
     x = np.asarray(axis.labels, float) * display_of(found, axis.name).factor
     figure = plots.kit.Figure(figsize=(plots.kit.PAGE_WIDTH, 3.0), layout="constrained")
     with plots.style():
@@ -74,7 +74,7 @@ def lines(found: Swept, name: str, axis: Axis, by: Axis | None = None) -> Any:
 
 
 def heat_map(found: Swept, name: str, x: Axis, y: Axis, by: Axis | None = None) -> Any:
-    """The median of a value over two axes of numbers, a panel for each label of `by`, all on one scale."""
+    """The median of a value over two axes of numbers, one panel for each label of `by`, all on one scale."""
     panels = [(who, quartiles(values)[1]) for who, values in _series(found, name, by, x, y)][:MOST_PANELS]
     finite = np.concatenate([values[np.isfinite(values)] for _, values in panels])
     columns = min(COLUMNS, len(panels))
@@ -102,7 +102,7 @@ def heat_map(found: Swept, name: str, x: Axis, y: Axis, by: Axis | None = None) 
 
 
 def violins(found: Swept, name: str, axis: Axis) -> Any:
-    """How a value is distributed over all runs, for each label of an axis, with its median and quartiles."""
+    """The distribution of a value over all runs, for each label of an axis, with its median and quartiles."""
     values = at_front(found, name, [axis])
     whole = [one[np.isfinite(one)] for one in values]
     log = _is_wide(values)
@@ -134,7 +134,7 @@ def violins(found: Swept, name: str, axis: Axis) -> Any:
 
 
 def rank_bars(found: Swept, name: str, axis: Axis) -> Any:
-    """How often each label comes first, second, ... on the same runs, the best on average above."""
+    """How often each label comes first, second, ... on the same runs, with the best average on top."""
     one = ranks(found, name, axis)
     order = np.argsort(-one.mean)
     figure = plots.kit.Figure(figsize=(plots.kit.PAGE_WIDTH, 0.9 + 0.35 * len(order)), layout="constrained")
@@ -154,7 +154,7 @@ def rank_bars(found: Swept, name: str, axis: Axis) -> Any:
 
 
 def over_samples(found: Swept, name: str, axis: Axis, by: Axis | None = None) -> Any:
-    """A value over each number of an axis of samples: median and quartiles of bins of as many samples each."""
+    """A value over each number of an axis of samples: median and quartiles of bins with equal numbers of samples."""
     columns = axis.columns or {}
     figure = plots.kit.Figure(figsize=(plots.kit.PAGE_WIDTH, 0.5 + 2.4 * -(-len(columns) // 2)), layout="constrained")
     with plots.style():
@@ -193,7 +193,7 @@ def _band(ax: Any, i: int, x: np.ndarray, three: np.ndarray, who: str) -> None:
 
 
 def _series(found: Swept, name: str, by: Axis | None, *axes: Axis) -> Iterator[tuple[str, np.ndarray]]:
-    """The values with these axes in front, (axes..., runs), of each label of `by`."""
+    """The values with these axes in front, (axes..., runs), for each label of `by`."""
     if by is None:
         yield "", at_front(found, name, axes)
         return
@@ -202,7 +202,7 @@ def _series(found: Swept, name: str, by: Axis | None, *axes: Axis) -> Iterator[t
 
 
 def _is_wide(values: np.ndarray) -> bool:
-    """Whether numbers are positive and of so different size that equal ratios should be equal steps."""
+    """Whether numbers are positive and differ so much in size that they need a logarithmic axis."""
     values = values[np.isfinite(values)]
     low, high = np.quantile(values, [0.05, 0.95]) if values.size else (1.0, 1.0)
     return bool(values.size and low > 0 and (values > 0).all() and high > SPREAD * low)

@@ -1,4 +1,4 @@
-"""What a study reports of each run, by name."""
+"""The metrics that a study reports of each run, by name."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from jaxveh.io import kit
 
 
 class Errors(NamedTuple):
-    """Of one quantity in the rows that count: (T,) `error`, estimate less truth, and `std`, both in its unit, and which rows
-    `count`; `baseline` (T,): the error of doing nothing."""
+    """The errors of one quantity: (T,) `error`, estimate less truth, and `std`, both in its unit; `counts`: the rows that count;
+    `baseline` (T,): the error of doing nothing."""
 
     error: Any
     std: Any
@@ -26,8 +26,8 @@ class Errors(NamedTuple):
 
 
 class Run(NamedTuple):
-    """What a metric of a whole run sees: the `estimate` (with `info.nis`), the rows that `count` (T,), whether the drive and the
-    filter `failed`."""
+    """The input of a metric of a whole run: the `estimate` (with `info.nis`), the rows that count as `counts`, (T,), and
+    whether the drive or the filter `failed`."""
 
     estimate: Any
     counts: Any
@@ -35,8 +35,8 @@ class Run(NamedTuple):
 
 
 class Metric(NamedTuple):
-    """How to compute it, its unit ("=": the quantity's), what to say; `of_quantity`: it is asked for as
-    `name.quantity`."""
+    """How to `compute` it, its `unit` ("=": that of the quantity), a line of `help`; `of_quantity`: its name is followed by a
+    quantity, `name.quantity`."""
 
     compute: Callable[[Any], Any]
     unit: str
@@ -67,43 +67,44 @@ METRICS: dict[str, Metric] = {
     "rmse": Metric(lambda e: _rms(e.error, e.counts), "=", "root mean square error"),
     "baseline": Metric(
         lambda e: _rms(e.baseline, e.counts), "=",
-        "the same of doing nothing: the told car on linear tyres, no sensor (v_y, yaw_rate, sideslip); else the prior's mean",
+        "root mean square error of doing nothing: the told car on linear tyres without sensors (v_y, yaw_rate, sideslip); "
+        "otherwise the prior's mean",
     ),
     "bias": Metric(lambda e: _mean(e.error, e.counts), "=", "mean of the error"),
     "worst": Metric(lambda e: jnp.max(jnp.where(e.counts, jnp.abs(e.error), 0.0)), "=", "largest absolute error"),
     "final": Metric(lambda e: jnp.abs(e.error[-1]), "=", "absolute error in the last row"),
     "coverage_50": Metric(_coverage(bands.NORMAL_HALF), "-", "share of rows inside the central 50 % band"),
     "coverage_95": Metric(_coverage(bands.NORMAL_95), "-", "share of rows inside the central 95 % band"),
-    "nees": Metric(lambda e: _mean((e.error / e.std) ** 2, e.counts), "-", "mean of (error / standard deviation)^2, 1 if honest"),
-    "crps": Metric(_crps, "=", "continuous ranked probability score, the lower the better"),
+    "nees": Metric(lambda e: _mean((e.error / e.std) ** 2, e.counts), "-", "mean of (error / standard deviation)^2, ideally 1"),
+    "crps": Metric(_crps, "=", "continuous ranked probability score, smaller is better"),
     "nis": Metric(
         lambda r: _mean(r.estimate.info.nis, r.counts), "-", "mean normalised innovation squared (Gaussian filters)", False
     ),
-    "log_likelihood": Metric(lambda r: r.estimate.log_likelihood, "-", "of all measurements", False),
-    "failed": Metric(lambda r: r.failed, "-", "1 where the drive or the filter failed, else 0", False),
+    "log_likelihood": Metric(lambda r: r.estimate.log_likelihood, "-", "log-likelihood of all measurements", False),
+    "failed": Metric(lambda r: r.failed, "-", "1 if the drive or the filter failed, otherwise 0", False),
 }  # fmt: skip
 """Metrics by name."""
 
 ALWAYS = ("failed",)
-"""What is reported whether it is asked for or not."""
+"""The metrics that are always reported."""
 
 
 class AskedMetric(NamedTuple):
-    """A metric's name, and its quantity ("": of the whole run)."""
+    """A metric's name, and its quantity ("" for a metric of the whole run)."""
 
     metric: str
     quantity: str
 
     @property
     def name(self) -> str:
-        """As it is asked for and stored: `rmse.sideslip`."""
+        """The name in the file and in the results: `rmse.sideslip`."""
         return f"{self.metric}.{self.quantity}" if self.quantity else self.metric
 
 
 def asked_metrics(names: Any) -> tuple[AskedMetric, ...]:
-    """The metrics of these names; beside each rmse its baseline, and what is always there.
+    """The metrics of these names, with the baseline of each rmse, and those that are always reported.
 
-    **Raises** `InputError` for a name that is not there, or one that lacks its quantity.
+    **Raises** `InputError` for an unknown name, or for one without its quantity.
     """
     if not isinstance(names, list | tuple) or not names:
         raise InputError(f'metrics.names = {names!r}: must be a list of names, such as ["rmse.sideslip", "failed"].')
@@ -127,7 +128,7 @@ def asked_metrics(names: Any) -> tuple[AskedMetric, ...]:
 
 
 def unit_of_metric(asked: AskedMetric, unit: str) -> str:
-    """The metric's unit, where its quantity's is `unit`."""
+    """The metric's unit, if `unit` is that of its quantity."""
     own = METRICS[asked.metric].unit
     return unit if own == "=" else own
 

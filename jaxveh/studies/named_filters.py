@@ -1,4 +1,4 @@
-"""Filters by name, with their options as plain values: what a study's file can say of one."""
+"""Filters by name, with their options as plain values, as a study's file gives them."""
 
 from __future__ import annotations
 
@@ -37,16 +37,17 @@ def filter_options(name: str) -> list[str]:
 
 
 def filter_of(told: str | Mapping[str, Any], where: str = "filter") -> AbstractFilter:
-    """The filter of a name, or of a table with `name` and its options: plain values, `form` by its name, `inner` a filter again.
+    """The filter of a name, or of a table with `name` and its options: plain values, `form` by name, `inner` as a filter
+    again.
 
         filter_of({"name": "gated", "limit": 3.0, "inner": "extended"})
 
-    **Raises** `InputError` for a name or an option that is not there, and as the filter's class does.
+    **Raises** `InputError` for an unknown name or option, and as the filter's class does.
     """
     table = {"name": told} if isinstance(told, str) else dict(told)
     name = table.pop("name", None)
     if not isinstance(name, str):
-        raise InputError(f"{where}: name is missing; it is one of {', '.join(FILTERS)}.")
+        raise InputError(f"{where}: name is missing; it must be one of {', '.join(FILTERS)}.")
     kit.check_known(where, "filter", name, FILTERS)
     kind = FILTERS[name]
     known = inspect.signature(kind).parameters
@@ -72,5 +73,5 @@ def _option(where: str, option: str, value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Lists as tuples, however deep."""
+    """Lists as tuples, at any depth."""
     return tuple(_plain(one) for one in value) if isinstance(value, list) else value

@@ -14,9 +14,9 @@ from jaxveh.io import kit
 
 
 def with_numbers(what: str, thing: Any, numbers: Mapping[str, Any]) -> Any:
-    """`thing` with these numbers in place of its own, by name (`mass`, `front.B`).
+    """`thing` with these numbers replaced, by name (`mass`, `front.B`).
 
-    **Raises** `InputError` for a name that it does not have, with the near ones, and for a value out of its range (tracers pass).
+    **Raises** `InputError` for an unknown name, with similar names, and for a value out of its range (tracers pass).
     """
     if not numbers:
         return thing
@@ -34,13 +34,13 @@ def with_numbers(what: str, thing: Any, numbers: Mapping[str, Any]) -> Any:
 
 
 def unit_of(thing: Any, name: str) -> str:
-    """The unit of a number by its name; `-` for one that has none, or that is not there."""
+    """The unit of a number by its name; `-` if it has none, or if there is no such number."""
     known = every_parameter(thing)
     return known[name].unit if name in known else "-"
 
 
 def flat(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    """A nested table as one of dotted names."""
+    """A nested table as one with dotted names."""
     found: dict[str, Any] = {}
     for name, value in table.items():
         found |= flat(value, f"{before}{name}.") if isinstance(value, Mapping) else {f"{before}{name}": value}

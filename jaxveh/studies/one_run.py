@@ -1,4 +1,4 @@
-"""One run of a study: a drive is simulated, estimated by a filter, and measured against its truth."""
+"""One run of a study: a drive is simulated, estimated by a filter, and compared with its truth."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from jaxveh.studies.numbers import with_numbers
 from jaxveh.studies.settings import speed_and_steer
 
 OPEN_LOOP = ("v_y", "yaw_rate", "sideslip")
-"""Of which a linear single track without sensors says something."""
+"""Quantities that a linear single track predicts without sensors."""
 
 SHARED = ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg")
 """Numbers of an estimator's own car that its single track takes over."""
 
 
 def run_of(settings: Mapping[str, Any], key: jax.Array, duration: float | None = None) -> dict[str, Any]:
-    """Simulate and estimate as the settings say: the metrics by name. No estimator sees the truth."""
+    """Simulate and estimate according to the settings. Returns the metrics by name. No estimator sees the truth."""
     drive_key, sensor_key, filter_key = jax.random.split(key, 3)
     drive = drive_of(settings, drive_key, duration)
     recording = renamed_channels(simulate(drive, sensor_key), settings["channels"])
@@ -62,7 +62,7 @@ def _errors(
 
 
 def _nothing(quantity: str, settings, model: Any, recording: Any, log: Any) -> Any:
-    """What one knows of a quantity without any sensor but the steering and the speed: (T,), or one number."""
+    """The prediction of a quantity without any sensor except the steering and the speed: (T,), or one number."""
     if quantity in OPEN_LOOP and "steer" in recording:
         told = told_car(settings)
         car = told if isinstance(told, vehicles.SingleTrack) else _single_track(settings, told)
@@ -75,6 +75,6 @@ def _nothing(quantity: str, settings, model: Any, recording: Any, log: Any) -> A
 
 
 def _single_track(settings: Mapping[str, Any], told: Any) -> vehicles.SingleTrack:
-    """The car's file as a single track, with what it shares with the told car."""
+    """The single track of the car's file, with the numbers that it shares with the told car."""
     car = car_of(settings["drive"]["vehicle"], "single-track")
     return with_numbers("told", car, {name: getattr(told, name) for name in SHARED if hasattr(told, name)})

@@ -15,7 +15,7 @@ from jaxveh.studies.settings import DEFAULTS, WHOLE, with_defaults
 from jaxveh.studies.study import Study
 
 SEEDS = 20
-"""Runs at every point, where the file is silent."""
+"""Runs at every point, if the file gives no number."""
 
 STUDY_SCHEMA = """\
 # A study: how well an estimator does over many simulated drives. Angles are rad and units SI unless the key says otherwise.
@@ -32,27 +32,27 @@ road = "level"
 rate = 50.0                     # rows a second, Hz
 # duration = 8.0                # s; and the manoeuvre's own options
 
-[car]                           # numbers of the true car that are not as in its file, which the estimator is not told
+[car]                           # numbers of the true car that differ from its file; the estimator is not told them
 mass = 1550.0                   # kg
 
 [sensors]
-devices = "esc"                 # or "production", "proving-ground"; of esc standard deviations by channel:
+devices = "esc"                 # or "production", "proving-ground"; for esc standard deviations by channel:
 yaw_rate = 0.005                # rad/s
 a_y = 0.1                       # m/s^2
-v_x = 0.1                       # m/s: an input of the estimator's single track, which this car does not say otherwise
+v_x = 0.1                       # m/s: an input of the estimator's single track, which this car gives only as a measurement
 
-# [channels]                    # what the estimator calls a channel that is recorded under another name; the inputs of its
-# v_x = "speed"                 # model are held from one row to the next in which a device says them
+# [channels]                    # the estimator's name of a channel that is recorded under another name; the inputs of its
+# v_x = "speed"                 # model are held in rows without a measurement
 
 [estimator]                     # the model that the filter sees
 name = "state-space"            # or "sideslip", "mass-and-grade"
 fidelity = "single-track"
 # estimate = ["front.D"]        # parameters among the states
 
-[told]                          # numbers of the estimator's own car that are not as in its file
+[told]                          # numbers of the estimator's own car that differ from its file
 yaw_inertia = 2300.0            # kg m^2
 
-[process_noise]                 # of state-space, by state, in unit per root second
+[process_noise]                 # of state-space, by state, in its unit per root second
 v_y = 0.05
 yaw_rate = 0.02
 
@@ -64,8 +64,8 @@ names = ["rmse.sideslip", "coverage_95.sideslip", "nis"]
 after = 0.5                     # s: rows before it do not count
 
 [vary]                          # every combination of these
-# Speed, steer_deg, and the numbers of car, told, sensors and noises vary within one compiled program; of all else (names,
-# the manoeuvre's options, a filter's) each value is a program of its own.
+# Speed, steer_deg, and the numbers of car, told, sensors and noises vary within one compiled program; for everything else
+# (names, options of the manoeuvre or the filter) each value is a program of its own.
 "sensors.yaw_rate" = [0.002, 0.02]
 "drive.speed" = {from = 15.0, to = 25.0, count = 3}   # scale = "log" for equal ratios
 
@@ -73,18 +73,19 @@ after = 0.5                     # s: rows before it do not count
 EKF = "extended"
 UKF = "unscented"
 
-[vary.samples]                  # points that fill a box, as one axis more
+[vary.samples]                  # points that fill a box, as a further axis
 method = "sobol"                # a power of two; or "latin-hypercube"
 count = 8
 ranges = {"car.mass" = [1400.0, 1700.0], "told.front.D" = [7000.0, 8500.0]}
 """
-"""The file's schema as a commented example that reads, for programs to print."""
+"""The file's schema as a commented example that can be read, for programs to print."""
 
 
 def read_study(path: str | os.PathLike) -> Study:
     """Read a study from TOML (`STUDY_SCHEMA`).
 
-    **Raises** `InputError` naming the file and what is not there, or out of range (with what is), before anything runs.
+    **Raises** `InputError` naming the file and the unknown key or the value out of range, with the valid ones, before any
+    run.
     """
     path = Path(path)
     try:
@@ -96,7 +97,7 @@ def read_study(path: str | os.PathLike) -> Study:
 
 
 def study_of(told: Mapping[str, Any], folder: Path = Path()) -> Study:
-    """A study from what a file says; cars' files are looked for from `folder`. It is not yet checked (`Study.check`)."""
+    """A study from a file's content; cars' files are searched for from `folder`. It is not yet checked (`Study.check`)."""
     for key in told:
         kit.check_known("study", "table", key, (*WHOLE, *DEFAULTS))
     seeds, seed = told.get("seeds", SEEDS), told.get("seed", 0)
@@ -112,7 +113,7 @@ def study_of(told: Mapping[str, Any], folder: Path = Path()) -> Study:
 
 
 def _with_files(axis: Varied, folder: Path) -> Varied:
-    """The axis with the files that its values name."""
+    """The axis with the files that its values name read in."""
     found = FILES.get((axis.path or "").removeprefix("drive."))
     return (
         axis
@@ -122,9 +123,9 @@ def _with_files(axis: Varied, folder: Path) -> Varied:
 
 
 def _car(name: Any, folder: Path) -> Any:
-    """A car's name as it is, or its file read."""
+    """A car's name unchanged, or its file read."""
     if not isinstance(name, str):
-        raise InputError(f"drive.vehicle = {name!r}: must be the name of a car, or of its file.")
+        raise InputError(f"drive.vehicle = {name!r}: must be the name of a car, or the path of its file.")
     if not Path(name).suffix:
         kit.check_known("drive.vehicle", "car", name, vehicles.kit.CARS, "Or give the path of a car's file (.toml).")
         return name
@@ -132,11 +133,11 @@ def _car(name: Any, folder: Path) -> Any:
 
 
 def _road(name: Any, folder: Path) -> Any:
-    """A road's name as it is, or the whole path of its file, which every worker must see."""
+    """A road's name unchanged, or the full path of its file, which every worker must see."""
     if isinstance(name, str) and Path(name).suffix:
         return str((folder / name).resolve())
     return name
 
 
 FILES = {"vehicle": _car, "road": _road}
-"""Keys of `drive` that may name a file, looked for from the study's folder."""
+"""Keys of `drive` that may name a file, relative to the study's folder."""

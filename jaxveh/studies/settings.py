@@ -1,4 +1,4 @@
-"""What a study says: nested tables with defaults, checked key by key; and one of its points."""
+"""The settings of a study: nested tables with defaults, checked key by key; and the settings of one of its points."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "filter": {"name": "extended"},
     "metrics": {"names": ["rmse.sideslip", "coverage_95.sideslip", "failed"], "after": 0.0},
 }  # fmt: skip
-"""Every table of a study but `vary`, with what holds where the file is silent."""
+"""Every table of a study except `vary`, with the defaults of its keys."""
 
 WHOLE = ("seeds", "seed", "vary")
-"""Keys beside these tables."""
+"""Keys besides these tables."""
 
 OF_DRIVE = ("vehicle", "fidelity", "manoeuvre", "road", "rate", "speed", "steer_deg", "duration")
-"""Keys of `drive` beside the manoeuvre's own options."""
+"""Keys of `drive` besides the manoeuvre's own options."""
 
 
 def with_defaults(told: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """The study's tables, each with its defaults; `filter` and `estimator` may be a name alone."""
+    """The study's tables, each with its defaults; `filter` and `estimator` may be just a name."""
     found: dict[str, dict[str, Any]] = {}
     for table, usual in DEFAULTS.items():
         own = told.get(table, {})
@@ -68,6 +68,6 @@ def check_drive(drive: Mapping[str, Any]) -> None:
 
 
 def speed_and_steer(drive: Mapping[str, Any]) -> tuple[Any, Any]:
-    """Speed (m/s) and steer (degrees) of a drive; usual ones where it does not say."""
+    """Speed (m/s) and steer (degrees) of a drive; the manoeuvre's usual ones if it gives none."""
     usual = USUAL[drive["manoeuvre"]]
     return drive.get("speed", usual.speed), drive.get("steer_deg", usual.steer_deg)

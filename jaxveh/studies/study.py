@@ -1,4 +1,4 @@
-"""A study: what is simulated, estimated and measured, and what of it varies."""
+"""A study: what is simulated, estimated and measured, and which settings vary."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ from jaxveh.studies.settings import put_at
 from jaxveh.sweeps import Axis, Design
 
 UNITS = {"drive.speed": "m/s", "drive.steer_deg": "°", "drive.duration": "s", "drive.rate": "Hz"}
-"""Of what is no number of an object."""
+"""Units of settings that are not numbers of an object."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Study:
-    """`settings`: nested tables as in a study's file, cars' files read; `axes`: what varies; `sampled`: the paths of the samples'
-    numbers by their names; `seeds` runs at every point, drawn from `seed`. Called, it is the `run` of a sweep."""
+    """`settings`: nested tables as in a study's file, with cars' files read; `axes`: the varied settings; `sampled`: the
+    paths of the samples' numbers by their names; `seeds` runs at every point, drawn from `seed`. When called, it is the
+    `run` of a sweep."""
 
     settings: Mapping[str, Any]
     axes: tuple[Varied, ...]
@@ -37,21 +38,21 @@ class Study:
 
     @property
     def design(self) -> Design:
-        """Every combination of what varies."""
+        """Every combination of the varied settings."""
         return design_of(self.axes)
 
     @property
     def key(self) -> jax.Array:
-        """Of which every run's key is split."""
+        """The key from which every run's key is split."""
         return jax.random.key(self.seed)
 
     @property
     def size(self) -> int:
-        """How many runs there are."""
+        """The number of runs."""
         return self.seeds * math.prod(self.design.shape)
 
     def words(self) -> str:
-        """What is simulated and estimated, and who is told what, in a few sentences."""
+        """What is simulated and estimated, and what the estimator is told, in a few sentences."""
         s, paths = self.settings, [*(axis.path for axis in self.axes if axis.path is not None), *self.sampled.values()]
         of = lambda table: ", ".join(
             sorted({f"{table}.{name}" for name in flat(s[table])} | {p for p in paths if p.startswith(f"{table}.")})
@@ -59,12 +60,12 @@ class Study:
         drive = s["drive"]
         car = drive["vehicle"] if isinstance(drive["vehicle"], str) else drive["vehicle"].name or "the car's file"
         own = f", with its own {of('told')}" if of("told") else ""
-        noise = "as measurement_noise says" if s["measurement_noise"] else "as it is"
+        noise = "from measurement_noise" if s["measurement_noise"] else "as it is"
         varied = ", ".join(paths) or "nothing"
         return (
-            f"{car} as {drive['fidelity']}, {drive['manoeuvre']} on {drive['road']}, seen by {s['sensors']['devices']}, "
-            f"estimated by {s['estimator']['name']} and {s['filter']['name']}, of which is varied: {varied}. "
-            f"The estimator is told the car's numbers{' but for ' + of('car') if of('car') else ''}"
+            f"{car} as {drive['fidelity']}, {drive['manoeuvre']} on {drive['road']}, measured by {s['sensors']['devices']}, "
+            f"estimated by {s['estimator']['name']} and {s['filter']['name']}. Varied: {varied}. "
+            f"The estimator is told the car's numbers{' except ' + of('car') if of('car') else ''}"
             f"{own}, the sensors' noise {noise}, the speed at the start, and, exactly, inputs (steer) that no sensor measures."
         )
 
@@ -85,9 +86,9 @@ class Study:
         return settings
 
     def check(self) -> None:
-        """Build, without running it, what every combination of choices asks for, at both ends of everything that varies.
+        """Build, without running it, every combination of choices, at both ends of every varied setting.
 
-        **Raises** `InputError` for what is not there, or out of range.
+        **Raises** `InputError` for an unknown name or a value out of range.
         """
         for _, _, objects in self.design.combinations():
             duration = self._duration(next(self._ends(objects, lambda path: False)))
@@ -109,8 +110,8 @@ class Study:
         return found
 
     def _duration(self, point: Any) -> float | None:
-        """How long the drives of a point's choices take, s, None where the file says it: the longest of those that one program
-        has, for its rows are as many in each run."""
+        """Duration of the drives at a point's choices, s; None if the file gives it. It is the longest of those in one
+        program, whose runs all have the same number of rows."""
         if "duration" in self.at(point)["drive"]:
             return None
         objects = {axis.name: getattr(point, axis.name) for axis in self.design.choices}
@@ -119,8 +120,8 @@ class Study:
             return max(float(drive_of(self.at(one), jax.random.key(0)).driver.duration) for one in ends)
 
     def _ends(self, objects: Mapping[str, Any], moves: Callable[[str], bool]) -> Iterator[Any]:
-        """Points of these choices: every number at its first value, and each that `moves` (by its path) at its least and its
-        largest."""
+        """Points of these choices: every number at its first value, and each number that `moves` accepts (by its path) at
+        its least and its largest."""
         design, paths = self.design, {axis.name: axis.path for axis in self.axes}
         first = {axis.name: axis.at(np.asarray(0)) for axis in design.numbers}
         yield design.point(first, objects)
@@ -132,7 +133,7 @@ class Study:
 
 
 def _end(axis: Axis, part: str | None, end: Callable[[Any], Any]) -> Any:
-    """An end of an axis of numbers; of one `part` of its samples, of which the others are as in the first."""
+    """An end of an axis of numbers; for samples that of one `part`, with the others as in the first sample."""
     columns = axis.columns or {}
     return end(axis.values) if part is None else {**axis.at(np.asarray(0)), part: end(columns[part])}
 

@@ -1,4 +1,4 @@
-"""What is told of a sweep: which values and points, in which unit, and who came first."""
+"""A sweep in short: which values and points to show, in which units, and the ranks of the choices."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from jaxveh.io import kit
 from jaxveh.sweeps import Axis, Swept
 
 ERRORS = ("rmse", "worst", "crps", "final", "error")
-"""Values that begin so are errors, the smaller the better: they are compared in pairs and ranked."""
+"""Values with these prefixes are errors, for which smaller is better: they are compared in pairs and ranked."""
 
 SHOWN = {"rad": ("°", 180 / math.pi), "rad/s": ("°/s", 180 / math.pi)}
-"""Units that a reader thinks otherwise in, and by what to multiply."""
+"""Units that readers expect instead, with the factors of conversion."""
 
 
 class Shown(NamedTuple):
-    """How a value or an axis is shown: its `label` with the unit, and by what to multiply its numbers."""
+    """How a value or an axis is shown: its `label` with the unit, and the `factor` for its numbers."""
 
     label: str
     factor: float
@@ -32,9 +32,9 @@ def display_of(found: Swept, name: str) -> Shown:
 
 
 def plain_values(found: Swept, names: Iterable[str] = ()) -> list[str]:
-    """The values that are one number a run; of these `names` alone where some are given.
+    """The values that are one number per run; only those of `names` if some are given.
 
-    **Raises** `InputError` for a name that is not there.
+    **Raises** `InputError` for an unknown name.
     """
     dims = len(found.design.axes) + 1
     there = [name for name in found.values if np.ndim(found.values[name]) == dims]
@@ -44,19 +44,19 @@ def plain_values(found: Swept, names: Iterable[str] = ()) -> list[str]:
 
 
 def errors_of(found: Swept, names: Iterable[str]) -> list[str]:
-    """Those that are errors."""
+    """Those of `names` that are errors."""
     return [name for name in names if name.split(".")[0] in ERRORS]
 
 
 def baseline_of(found: Swept, name: str) -> str | None:
-    """The name of the error of doing nothing beside an rmse; None where there is none."""
+    """The name of the error of doing nothing that belongs to an rmse; None if there is none."""
     kind, _, quantity = name.partition(".")
     nothing = f"baseline.{quantity}"
     return nothing if kind == "rmse" and nothing in found.values else None
 
 
 def at_front(found: Swept, name: str, axes: Iterable[Axis]) -> np.ndarray:
-    """A value's numbers (shown unit) with these axes in front, everything else in one axis behind: (axes..., runs)."""
+    """A value's numbers (in the shown unit) with these axes in front and everything else in one last axis: (axes..., runs)."""
     order = [found.design.axes.index(axis) for axis in axes]
     values = np.asarray(found[name], float) * display_of(found, name).factor
     front = np.moveaxis(values, order, range(len(order)))
@@ -64,14 +64,14 @@ def at_front(found: Swept, name: str, axes: Iterable[Axis]) -> np.ndarray:
 
 
 def quartiles(values: np.ndarray) -> np.ndarray:
-    """(3, ...): lower quartile, median and upper quartile along the last axis; what is not finite counts as the largest."""
+    """(3, ...): lower quartile, median and upper quartile along the last axis; non-finite numbers count as the largest."""
     values = np.where(np.isfinite(values), values, np.inf)
     return np.quantile(values, [0.25, 0.5, 0.75], axis=-1, method="nearest")
 
 
 class Ranks(NamedTuple):
-    """Of each label of an axis, over all pairs of runs: the `mean` rank (1 is best), and the `shares` (labels, places) of coming
-    first, second, ...; equal ones share their places."""
+    """The ranks of the labels of an axis over all pairs of runs: the `mean` rank (1 is best), and the `shares` (labels,
+    places) of coming first, second, ...; equal runs share their places."""
 
     labels: tuple[str, ...]
     mean: np.ndarray
@@ -79,7 +79,7 @@ class Ranks(NamedTuple):
 
 
 def ranks(found: Swept, name: str, axis: Axis) -> Ranks:
-    """How the labels of an axis rank by an error on the same runs; a run that is not finite comes last."""
+    """The ranks of the labels of an axis by an error on the same runs; a run that is not finite comes last."""
     values = at_front(found, name, [axis])
     values = np.where(np.isfinite(values), values, np.inf)
     count = len(values)
@@ -93,5 +93,5 @@ def ranks(found: Swept, name: str, axis: Axis) -> Ranks:
 
 
 def label(value: Any) -> str:
-    """A label of an axis in words."""
+    """A label of an axis as text."""
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""Tables of a sweep: medians and quartiles by what varied, paired comparisons, ranks."""
+"""Tables of a sweep: medians and quartiles by axis, paired comparisons, ranks."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from jaxveh.studies.summary import at_front, baseline_of, display_of, errors_of,
 from jaxveh.sweeps import Axis, Comparison, Swept, Table, compare
 
 MOST_POINTS = 40
-"""Rows of the table of every point: larger designs are told by one axis at a time alone."""
+"""Most rows of the table of every point: larger designs get only the table by axis."""
 
 
 def tables(found: Swept, values: Iterable[str] = ()) -> list[Table]:
-    """Every table of a sweep, of these values (default: all that are one number a run)."""
+    """Every table of a sweep for these values (default: all that are one number per run)."""
     names = plain_values(found, values)
     made = [by_axis(found, names)]
     if 1 < int(np.prod([len(axis.labels) for axis in _listed(found)])) <= MOST_POINTS and len(_listed(found)) > 1:
@@ -30,7 +30,7 @@ def tables(found: Swept, values: Iterable[str] = ()) -> list[Table]:
 
 
 def by_axis(found: Swept, names: list[str]) -> Table:
-    """Medians and quartiles at each label of each axis, over everything else; samples are told in figures."""
+    """Medians and quartiles at each label of each axis, over everything else; samples are shown only in figures."""
     rows = [("all", "", *(_cell(at_front(found, name, [])) for name in names))]
     for axis in _listed(found):
         factor = display_of(found, axis.name).factor
@@ -55,8 +55,8 @@ def by_point(found: Swept, names: list[str]) -> Table:
 
 
 def compare_by_seed(a: np.ndarray, b: np.ndarray) -> Comparison:
-    """Errors a against b (points..., seeds): each seed counts with its geometric mean over all points, so that intervals are
-    those of seeds; `wins` are counted run by run. A run that is not finite has lost."""
+    """Errors a against b (points..., seeds). Each seed counts with its geometric mean over all points, so that the intervals are
+    those over seeds; `wins` are counted run by run. A run that is not finite has lost."""
     a, b = (np.where(np.isfinite(values), values, np.inf).reshape(-1, values.shape[-1]) for values in (a, b))
     with np.errstate(divide="ignore"):
         made = compare(*(np.exp(np.log(values).mean(axis=0)) for values in (a, b)))
@@ -102,7 +102,7 @@ def _comparison(one: Comparison) -> tuple[Any, ...]:
 
 
 def _listed(found: Swept) -> list[Axis]:
-    """The axes whose labels say something: all but samples."""
+    """The axes whose labels are worth listing: all except samples."""
     return [axis for axis in found.design.axes if axis.columns is None]
 
 

@@ -1,4 +1,4 @@
-"""One chunk of a stored sweep: computed and written, by whichever process."""
+"""One chunk of a stored sweep: computed and written by any process."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from jaxveh.sweeps.workers import fit_for
 
 
 class Unfit(Exception):
-    """A process that would compute other numbers than the sweep was begun with."""
+    """A process that would compute other numbers than the process that began the sweep."""
 
 
 def lower(run: Callable[..., Any], design: Design, choices: dict[str, Any], arguments: tuple) -> Any:
@@ -30,18 +30,19 @@ def lower(run: Callable[..., Any], design: Design, choices: dict[str, Any], argu
 
 
 class ChunkError(Exception):
-    """What went wrong in a chunk, in words: not every error can be sent from one process to another."""
+    """An error in a chunk, as text: not every error can be sent from one process to another."""
 
 
 class Job(NamedTuple):
-    """What a process needs for any chunk but the runs' arguments."""
+    """Everything that a process needs for any chunk, except the runs' arguments."""
 
     run: Callable[..., Any]
     design: Design
     path: str
 
     def to_bytes(self) -> bytes:
-        """The job as bytes; functions of a script, a notebook or a module of one's own by value, for workers need not have it."""
+        """The job as bytes. Functions of a script, a notebook or a user's own module go by value, as workers may not have
+        it."""
         cloudpickle = kit.require("cloudpickle", "sending a sweep to other processes", "sweep")
         module = inspect.getmodule(self.run)
         if module is None or not _is_ones_own(module):
@@ -54,7 +55,7 @@ class Job(NamedTuple):
 
 
 def _is_ones_own(module: ModuleType) -> bool:
-    """Whether a module is a file that nobody has installed."""
+    """Whether a module is a file that is not installed as a package."""
     file, name = getattr(module, "__file__", None), module.__name__
     return file is not None and name != "__main__" and name.partition(".")[0] != "jaxveh" and "-packages" not in file
 
@@ -71,10 +72,10 @@ class Computing:
         differs = [name for name in identity.OF_PROCESS if here[name] != stored[name]]
         if differs:
             name = differs[0]
-            raise Unfit(f"{name} is {here[name]!r} here, and {stored[name]!r} where the sweep was begun")
+            raise Unfit(f"{name} is {here[name]!r} here, but {stored[name]!r} in the process that began the sweep")
 
     def do(self, number: int, arguments: tuple) -> None:
-        """Compute a chunk and write it; nothing is done where it is done already."""
+        """Compute a chunk and write it, unless it is already done."""
         if self.store.is_done(number):
             return
         chunk = self.store.plan.chunk(number)
@@ -91,20 +92,20 @@ class Computing:
             wanted = self.store.identity["programs"][said]
             if identity.of_program(lowered) != wanted:
                 raise Unfit(
-                    f"run computes something else here ({said or 'its program'}) than where the sweep was begun"
+                    f"run computes something else here ({said or 'its program'}) than in the process that began the sweep"
                 )
             program = lowered.compile()
-            fit_for(program, jax.devices()[:1])  # warns where it may stand still
+            fit_for(program, jax.devices()[:1])  # warns if it may never end
             self._compiled[choice] = program
         return self._compiled[choice]
 
 
 _jobs: dict[str, Computing] = {}
-"""What this process works on, by the hash of the job; the last one only."""
+"""The job that this process works on, by its hash; only the last one."""
 
 
 def do_chunk(packed: bytes, number: int, arguments: tuple, settings: dict[str, Any]) -> int:
-    """A chunk in a process of its own: `arguments` as `packed_arguments` makes them. Returns its number."""
+    """Compute one chunk in a worker process, with `arguments` as `packed_arguments` makes them. Returns its number."""
     which = hashlib.sha256(packed).hexdigest()
     if which not in _jobs:
         for name, value in settings.items():
@@ -113,7 +114,7 @@ def do_chunk(packed: bytes, number: int, arguments: tuple, settings: dict[str, A
         try:
             job = kit.require("cloudpickle", "a sweep's worker", "sweep").loads(packed)
         except Exception as error:
-            raise Unfit(f"it cannot read what is to be done ({type(error).__name__}: {error})") from None
+            raise Unfit(f"it cannot read the job ({type(error).__name__}: {error})") from None
         _jobs[which] = Computing(job)
     try:
         _jobs[which].do(number, unpacked_arguments(arguments))
@@ -125,7 +126,7 @@ def do_chunk(packed: bytes, number: int, arguments: tuple, settings: dict[str, A
 
 
 def settings_of_jax() -> dict[str, Any]:
-    """Settings of this process that others need, so that they compute the same; and where compiled programs are kept."""
+    """Settings of this process that others need to compute the same numbers, and the folder of compiled programs."""
     names = (*identity.CONFIGURED, "jax_numpy_dtype_promotion", "jax_compilation_cache_dir")
     return {name: getattr(jax.config, name) for name in names}
 
@@ -147,7 +148,7 @@ def _pack(leaf: Any) -> Any:
 
 
 def unpacked_arguments(arguments: tuple) -> tuple:
-    """What `packed_arguments` was given."""
+    """The arguments that were given to `packed_arguments`."""
     is_key = lambda leaf: isinstance(leaf, _Key)
     unpack = lambda leaf: (
         jax.random.wrap_key_data(leaf.words, impl=leaf.impl) if is_key(leaf) else jax.numpy.asarray(leaf)

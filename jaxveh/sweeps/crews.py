@@ -1,4 +1,5 @@
-"""Who computes chunks beside this process: processes of this machine (loky), or workers of a Dask scheduler (distributed)."""
+"""Workers that compute chunks outside this process: processes of this machine (loky), or workers of a Dask scheduler
+(distributed)."""
 
 from __future__ import annotations
 
@@ -18,15 +19,15 @@ from jaxveh.sweeps.driving import Crew
 from jaxveh.sweeps.workers import POOL
 
 LOOK = 0.5
-"""s between two looks for the parent."""
+"""s between two checks of the parent."""
 
 THREADS = "2"
-"""Worker threads of a process: one computes, one is free for what it waits for (see `sweeps/workers.py`)."""
+"""Worker threads of a process: one computes, one is free for kernels on which it waits (see `sweeps/workers.py`)."""
 
 
 @contextlib.contextmanager
 def crew_for(client: Any, processes: int | None, packed: bytes, arguments: Callable[[int], tuple]) -> Iterator[Crew]:
-    """The workers that were asked for; `arguments` of a chunk by its number."""
+    """The workers that the caller asked for; `arguments` gives those of a chunk by its number."""
     if client is not None:
         with _client(client) as connected:
             crew = Cluster(connected, packed, arguments)
@@ -39,7 +40,7 @@ def crew_for(client: Any, processes: int | None, packed: bytes, arguments: Calla
     with tempfile.TemporaryDirectory(prefix="jaxveh-programs-") as folder:
         settings = settings_of_jax()
         if settings["jax_compilation_cache_dir"] is None:
-            # One process compiles, the others read.
+            # One process compiles, the others read the compiled programs.
             settings["jax_compilation_cache_dir"] = folder
         crew = Processes(int(processes or 1), packed, arguments, settings)
         try:
@@ -49,7 +50,7 @@ def crew_for(client: Any, processes: int | None, packed: bytes, arguments: Calla
 
 
 def end_with(parent: int) -> None:
-    """In a process of the crew: leave when the parent has gone, killed or not; loky's processes wait for ever."""
+    """Run in a process of the crew: exit when the parent has gone, killed or not; loky's processes would wait for ever."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -60,7 +61,7 @@ def end_with(parent: int) -> None:
 
 
 class Processes:
-    """Processes of this machine; when one dies, all are begun anew."""
+    """Processes of this machine; when one dies, all are restarted."""
 
     def __init__(self, count: int, packed: bytes, arguments: Callable[[int], tuple], settings: dict[str, Any]):
         self._loky = kit.require("loky", "a sweep in several processes", "sweep")
@@ -74,7 +75,7 @@ class Processes:
         )
 
     def submit(self, number: int) -> Future:
-        """Give out a chunk."""
+        """Hand out a chunk."""
         try:
             return self._pool.submit(do_chunk, self._packed, number, self._arguments(number), self._settings)
         except (self._loky.process_executor.BrokenProcessPool, RuntimeError):
@@ -82,7 +83,7 @@ class Processes:
             return self._pool.submit(do_chunk, self._packed, number, self._arguments(number), self._settings)
 
     def drop(self, future: Future) -> None:
-        """Processes cannot be told to stop one chunk: all are begun anew."""
+        """Restart all processes: loky cannot stop a single chunk."""
         self._again()
 
     def is_death(self, error: BaseException) -> bool:
@@ -101,40 +102,41 @@ class Processes:
 
 
 class Cluster:
-    """The workers of a Dask scheduler. Each chunk carries all that it needs: what is scattered is lost with its worker."""
+    """The workers of a Dask scheduler. Each chunk carries everything that it needs: scattered data are lost with their
+    worker."""
 
     def __init__(self, client: Any, packed: bytes, arguments: Callable[[int], tuple]):
         self._client, self._packed, self._arguments = client, packed, arguments
         self._distributed = kit.require("distributed", "a sweep on a cluster", "sweep")
         self._executor = client.get_executor(pure=False, retries=0)
-        # Where compiled programs are kept is said here, if it is, and is a folder that the workers see.
+        # A folder for compiled programs must be set here, if at all, and must be visible to the workers.
         self._settings = settings_of_jax()
 
     @property
     def workers(self) -> int:
-        """How many threads all workers have."""
+        """Number of threads of all workers."""
         try:
             return sum(self._client.ncores().values())
         except Exception as error:
             raise InputError(
-                f"sweep: the scheduler does not answer ({error}); what is done stays: start again."
+                f"sweep: the scheduler does not answer ({error}); finished chunks are kept: start again."
             ) from error
 
     def submit(self, number: int) -> Future:
-        """Give out a chunk."""
+        """Hand out a chunk."""
         return self._executor.submit(do_chunk, self._packed, number, self._arguments(number), self._settings)
 
     def drop(self, future: Future) -> None:
-        """Give up a chunk that takes too long."""
+        """Cancel a chunk that takes too long."""
         future.cancel()
 
     def end(self) -> None:
-        """Give up what is still out, as far as the scheduler hears it."""
+        """Cancel the chunks that are still out, if the scheduler still answers."""
         with contextlib.suppress(Exception):
             self._executor.shutdown(wait=False)
 
     def is_death(self, error: BaseException) -> bool:
-        """Whether a worker died, as Dask says it."""
+        """Whether a worker died, according to Dask."""
         return isinstance(error, self._distributed.scheduler.KilledWorker) or type(error).__name__ in (
             "KilledWorker", "FutureCancelledError", "CommClosedError",
         )  # fmt: skip
@@ -142,7 +144,7 @@ class Cluster:
 
 @contextlib.contextmanager
 def _client(client: Any) -> Iterator[Any]:
-    """A client of one's own, or one for a scheduler's address."""
+    """The caller's client, or a new one for a scheduler's address."""
     if not isinstance(client, str):
         if not hasattr(client, "get_executor"):
             raise InputError(

@@ -1,4 +1,4 @@
-"""What a sweep goes through: named axes of numbers, and of choices."""
+"""The design of a sweep: named axes of numbers and of choices."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from jaxveh.sweeps.sampling import Samples
 
 
 class Axis(NamedTuple):
-    """One name of a design: the `labels` that its results carry, the `values` that `run` gets, and whether it is a choice.
+    """One named axis of a design: the `labels` that its results carry, the `values` that `run` gets, and whether it is a
+    `choice`.
 
-    A choice (a filter, a manoeuvre, a function) is known when compiling: one program each. Numbers are one program for all.
-    Samples are numbered; `columns` has their numbers by name, (n,) each, and `run` gets those of its own.
+    A choice (a filter, a manoeuvre, a function) is known at compile time: each has its own program. All numbers share one
+    program. Samples are numbered; `columns` has their numbers by name, (n,) each, and `run` gets those of its own sample.
     """
 
     name: str
@@ -27,7 +28,7 @@ class Axis(NamedTuple):
     columns: dict[str, np.ndarray] | None = None
 
     def at(self, which: np.ndarray) -> Any:
-        """The numbers of values of these places; of samples by name."""
+        """The numbers at these places; for samples by name."""
         if self.columns is None:
             return np.asarray(self.values, float)[which]
         return {name: np.asarray(column, float)[which] for name, column in self.columns.items()}
@@ -42,7 +43,7 @@ class Design:
     objects is an axis of choices. `latin_hypercube` and `sobol` make an axis of samples, each with several numbers. Without axes
     there is one point.
 
-    **Raises** `InputError` for an empty axis, numbers that are not finite, or a sequence of something else.
+    **Raises** `InputError` for an empty axis, numbers that are not finite, or a sequence of anything but numbers.
     """
 
     axes: tuple[Axis, ...]
@@ -52,7 +53,7 @@ class Design:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """How many values each axis has."""
+        """The number of values of each axis."""
         return tuple(len(axis.values) for axis in self.axes)
 
     @property
@@ -66,7 +67,7 @@ class Design:
         return tuple(axis for axis in self.axes if not axis.choice)
 
     def axis(self, name: str) -> Axis:
-        """The axis of this name, or an `InputError` that lists what there is."""
+        """The axis of this name, or an `InputError` that lists the names."""
         for axis in self.axes:
             if axis.name == name:
                 return axis
@@ -74,20 +75,20 @@ class Design:
         raise InputError(f"axis = {name!r}: the design has {there}.")
 
     def combinations(self) -> Iterator[tuple[tuple[int, ...], str, dict[str, Any]]]:
-        """Each combination of choices: its place along the axes of choices, a description and the objects by name."""
+        """Each combination of choices: its place along the axes of choices, a description, and the objects by name."""
         for place in itertools.product(*(range(len(axis.values)) for axis in self.choices)):
             pairs = list(zip(self.choices, place, strict=True))
             said = ", ".join(f"{axis.name} {axis.labels[i]}" for axis, i in pairs)
             yield place, said, {axis.name: axis.values[i] for axis, i in pairs}
 
     def grid(self) -> dict[str, Any]:
-        """Each axis of numbers at all their combinations, (P,), of samples by name; the last axis runs fastest."""
+        """Each axis of numbers at all their combinations, (P,), with samples by name; the last axis varies fastest."""
         axes = self.numbers
         meshes = np.meshgrid(*(np.arange(len(axis.values)) for axis in axes), indexing="ij") if axes else []
         return {axis.name: axis.at(mesh.ravel()) for axis, mesh in zip(axes, meshes, strict=True)}
 
     def point(self, numbers: Mapping[str, Any], choices: Mapping[str, Any]) -> Any:
-        """What `run` gets: a NamedTuple with the axes' names, in their order."""
+        """The point that `run` gets: a NamedTuple with the axes' names, in their order."""
         both = {**numbers, **choices}
         for axis in self.axes:
             if axis.columns is not None:
@@ -116,7 +117,7 @@ def _numbers(name: str, values: Any) -> tuple[float, ...]:
         array = np.zeros((0, 0))
     if array.ndim != 1:
         raise InputError(
-            f"axis {name} = {values!r}: must be a sequence of numbers, or a mapping from labels to what is to be chosen."
+            f"axis {name} = {values!r}: must be a sequence of numbers, or a mapping from labels to choices."
         )
     check_finite(f"axis {name}", array)
     return tuple(float(number) for number in array)

@@ -1,4 +1,4 @@
-"""Chunks given out to other processes, until each is done or has failed three times."""
+"""Hands chunks to other processes, until each is done or has failed three times."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh.sweeps.chunks import Unfit
 
 TRIES = 3
-"""How often a chunk may fail."""
+"""Most failures of a chunk."""
 
 LOSSES = 50
-"""How often workers may die under one chunk until it is left as failed: that need not be the chunk's fault."""
+"""Most deaths of workers under one chunk before it counts as failed; the chunk need not be their cause."""
 
 AHEAD = 2
-"""Chunks that wait at each worker, so that none is idle between two."""
+"""Chunks that wait at each worker, so that no worker is idle between two chunks."""
 
-NOBODY = "sweep: the cluster has no worker; its chunks wait until one comes. What is done stays, if you end it here."
+NOBODY = "sweep: the cluster has no worker; the chunks wait until one comes. Finished chunks are kept if you stop here."
 
 POLL = 1.0
-"""Seconds after which time limits are looked at."""
+"""Seconds between two checks of the time limits."""
 
 
 class Crew(Protocol):
-    """Workers that take chunks."""
+    """Workers that compute chunks."""
 
     @property
     def workers(self) -> int:
-        """How many chunks are computed at once."""
+        """Number of chunks computed at once."""
         ...
 
     def submit(self, number: int) -> Future:
-        """Give out a chunk."""
+        """Hand out a chunk."""
         ...
 
     def drop(self, future: Future) -> None:
-        """Give up a chunk that takes too long."""
+        """Cancel a chunk that takes too long."""
         ...
 
     def is_death(self, error: BaseException) -> bool:
-        """Whether an error says that a worker died, and not what it worked on; workers are there again afterwards."""
+        """Whether an error means that a worker died, rather than an error in its chunk; new workers then take its place."""
         ...
 
 
@@ -54,9 +54,9 @@ def drive(
     on_done: Callable[[int], Any],
     on_failure: Callable[[int, str], Any],
 ) -> None:
-    """Have all chunks done by the crew, each within `limit` seconds of its start at most.
+    """Let the crew compute all chunks, each within `limit` seconds of its start at most.
 
-    Where there is no worker, as on a cluster that is still to start them, it is waited for one, and a warning says so.
+    If there is no worker, as on a cluster that has yet to start them, wait for one and warn.
     """
     waiting = list(reversed(list(numbers)))
     failed: dict[int, int] = {}
@@ -75,7 +75,7 @@ def drive(
         before = time.monotonic()
         while waiting and len(out) < AHEAD * max(1, crew.workers):
             number = waiting.pop()
-            # A chunk that waits behind others has their time, too.
+            # A chunk that waits behind others also gets their time.
             out[crew.submit(number)] = (number, time.monotonic() + AHEAD * limit)
         ready, _ = wait(out, timeout=POLL, return_when=FIRST_COMPLETED)
         for future in ready:
@@ -87,7 +87,7 @@ def drive(
                 raise InputError(f"sweep: a worker does not fit: {error}.")
             elif isinstance(error, OSError) and not crew.is_death(error):
                 raise InputError(
-                    f"sweep: a chunk cannot be written: {error}. What is done stays: start again."
+                    f"sweep: a chunk cannot be written: {error}. Finished chunks are kept: start again."
                 ) from error
             elif isinstance(error, CancelledError) or crew.is_death(error):
                 again(number, lost, LOSSES, error)
@@ -95,7 +95,7 @@ def drive(
                 again(number, failed, TRIES, error)
         now = time.monotonic()
         if crew.workers == 0:
-            # Nobody computes: what is out keeps its time.
+            # No worker computes: chunks that are out keep their time.
             out = {future: (number, end + now - before) for future, (number, end) in out.items()}
             if not is_told:
                 warnings.warn(NOBODY, JaxvehWarning, stacklevel=4)

@@ -1,4 +1,4 @@
-"""What the runs of a sweep are given: points of the design, keys, and parts of the data."""
+"""The arguments of the runs of a sweep: points of the design, keys, and parts of the data."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from jaxveh.sweeps.swept import named_leaves
 
 
 class Given:
-    """What the runs of one choice are given; they are ordered by point, then by seed."""
+    """The arguments of the runs of one choice, ordered by point, then by seed."""
 
     def __init__(self, design: Design, seeds: int | None, key: Any, data: Any):
         points = tuple(len(axis.values) for axis in design.numbers)
         parts = named_leaves(data)
         if key is None and not parts:
             raise InputError(
-                "sweep: give seeds and a key, from which each run draws, or data, of which each has its part."
+                "sweep: give seeds and a key, from which each run draws, or data, of which each run gets its part."
             )
         if key is not None:
             check_key("sweep", key)
@@ -39,7 +39,7 @@ class Given:
                 raise InputError(f"data {name} has shape {np.shape(leaf)}: must begin with {self.shape} ({names}).")
 
     def chunk(self, first: int, batch: int) -> tuple:
-        """Arguments of the runs from `first` on; behind the last one it is repeated."""
+        """Arguments of the runs from `first` on; beyond the last run it is repeated."""
         return self.of_runs(np.minimum(np.arange(first, first + batch), self.runs - 1))
 
     def of_runs(self, which: np.ndarray) -> tuple:
@@ -53,7 +53,7 @@ class Given:
 
 
 def _on_the_host(keys: jax.Array) -> Callable[[np.ndarray], jax.Array]:
-    """What picks some of the keys by number: NumPy does, for which nothing is compiled."""
+    """A function that picks keys by number, in NumPy, so that nothing is compiled for it."""
     if not jnp.issubdtype(keys.dtype, jax.dtypes.prng_key):
         raw = np.asarray(keys)
         return lambda which: jnp.asarray(raw[which])

@@ -1,4 +1,4 @@
-"""What decides a stored sweep's numbers to the last bit, in words that can be compared and stored."""
+"""Everything that determines a stored sweep's numbers to the last bit, as text that can be compared and stored."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ CONFIGURED = ("jax_enable_x64", "jax_default_matmul_precision", "jax_threefry_pa
 """Settings of jax on which results depend."""
 
 OF_PROCESS = ("jaxveh", "jax", "jaxlib", "XLA_FLAGS", *CONFIGURED, "processor")
-"""What belongs to a process that computes chunks; the rest is what was asked for."""
+"""Entries that belong to a process that computes chunks; the others belong to the sweep."""
 
 
 def identity(design: Design, given: Given, plan: Plan, programs: Mapping[str, str]) -> dict[str, Any]:
-    """All that a sweep's numbers follow from. `programs`: a description of each combination of choices, and the hash of what it
-    computes."""
+    """Everything from which a sweep's numbers follow. `programs`: the description of each combination of choices, with the
+    hash of its program."""
     axes = [_of_axis(axis) for axis in design.axes]
     return {
         "design": axes,
@@ -48,7 +48,7 @@ def _of_axis(axis: Axis) -> dict[str, Any]:
 
 
 def of_process() -> dict[str, Any]:
-    """What this process would compute with."""
+    """The versions and settings with which this process computes."""
     settings = {name: str(getattr(jax.config, name)) for name in CONFIGURED}
     flags = " ".join(sorted(os.environ.get("XLA_FLAGS", "").split()))
     versions = {"jaxveh": VERSION, "jax": version("jax"), "jaxlib": version("jaxlib")}
@@ -56,23 +56,23 @@ def of_process() -> dict[str, Any]:
 
 
 def of_program(lowered: Any) -> str:
-    """The hash of what a lowered program computes, with all numbers that `run` has closed over."""
+    """The hash of a lowered program, with all numbers in the closure of `run`."""
     return hashlib.sha256(lowered.as_text().encode()).hexdigest()[:16]
 
 
 def check_same(path: Any, stored: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
-    """Raise where a store was begun with something else, naming the first such thing."""
+    """Raise `InputError` if a store was begun with something else, naming the first difference."""
     was, here = _flat(stored), _flat(asked)
     for name in [*here, *(name for name in was if name not in here)]:
         if was.get(name) != here.get(name):
             raise InputError(
                 f"{path}: it was begun with {name} = {_short(was.get(name))}, here it is {_short(here.get(name))}: these are not "
-                "numbers of one sweep. Take another store, or what it was begun with."
+                "numbers of one sweep. Take another store, or the setting with which it was begun."
             )
 
 
 def _flat(identity: Mapping[str, Any]) -> dict[str, Any]:
-    """An identity whose axes, data and programs have names of their own."""
+    """An identity whose axes, data and programs have their own names."""
     axes = {f"axis {axis['name']}": axis.get("columns", axis["labels"]) for axis in identity["design"]}
     data = {f"data {name or 'array'}": said for name, said in identity["data"].items()}
     programs = {f"the hash of the program of {said or 'run'}": found for said, found in identity["programs"].items()}

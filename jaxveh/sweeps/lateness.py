@@ -1,4 +1,4 @@
-"""A word about a chunk that takes long: nothing is stopped, but nobody waits without knowing for what."""
+"""A warning about a chunk that takes long: nothing is stopped, but the user learns what is running."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jaxveh._core.errors import JaxvehWarning
 
 @contextlib.contextmanager
 def warn_when_late(what: str, patience: float | None) -> Iterator[None]:
-    """Warn each time that the block has taken another `patience` seconds (None: never), naming `what` it does."""
+    """Warn each time that the block has taken another `patience` seconds (None: never); `what` is its name in the warning."""
     if patience is None:
         yield
         return
@@ -29,8 +29,8 @@ def _watch(what: str, patience: float, ended: threading.Event) -> None:
     times = 1
     while not ended.wait(patience):
         warnings.warn(
-            f"sweep: {what} has not finished for {times * patience:g} s. Where the processor is busy, it may only be slow: a "
-            "smaller batch= says more often how far it is. Where the processor is idle, it stands still: stop it, and run "
+            f"sweep: {what} has not finished for {times * patience:g} s. If the processor is busy, it may only be slow: a "
+            "smaller batch= reports progress more often. If the processor is idle, it will never end: stop it, and run "
             "again on one device (devices=jax.devices()[:1], or JAX_NUM_CPU_DEVICES=1 in the environment).",
             JaxvehWarning,
             stacklevel=1,

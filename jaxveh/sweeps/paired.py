@@ -1,4 +1,4 @@
-"""Two estimators on the same seeds: ratios, wins, and how sure one can be of them."""
+"""Two estimators on the same seeds: ratios, wins, and their confidence intervals."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ConfidenceInterval(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """Positive numbers (errors) of a against those of b on the same seeds.
+    """Positive numbers (errors) of a compared with those of b on the same seeds.
 
     `ratio`: the median over seeds of a / b, with its interval; `of_medians`: the ratio of both medians, with its interval;
     `wins`: the share of seeds in which a is smaller; a tie is half a win. A run that is not finite has lost.
@@ -35,9 +35,10 @@ class Comparison(NamedTuple):
 def compare(a: np.ndarray, b: np.ndarray, *, axis: int = -1, level: float = 0.95) -> Comparison:
     """Compare errors `a` and `b` of the same shape, paired along `axis` (the seeds).
 
-    Intervals are percentiles of the statistic over seeds drawn with replacement (B. Efron 1979), always the same draws.
+    Intervals are percentiles of the statistic over seeds drawn with replacement (B. Efron 1979); the draws are always the
+    same.
 
-    **Raises** `InputError` for shapes that differ, fewer than two seeds, or a negative value.
+    **Raises** `InputError` for different shapes, fewer than two seeds, or a negative value.
     """
     check("level", level, lambda p: (p > 0) & (p < 1), "above 0 and below 1")
     a, b = np.asarray(a, float), np.asarray(b, float)
@@ -62,14 +63,14 @@ def compare(a: np.ndarray, b: np.ndarray, *, axis: int = -1, level: float = 0.95
 
 
 def _ratios(a, b):
-    """a / b, where infinite over infinite (both have lost) and zero over zero are a tie."""
+    """a / b; infinite over infinite (both have lost) and zero over zero are a tie."""
     tie = a == b
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(tie, 1.0, a / np.where(tie, 1.0, b))
 
 
 def _median(values):
-    """The median along the last axis; of infinities, too."""
+    """The median along the last axis, also of infinities."""
     ordered = np.sort(values, axis=-1)
     n = ordered.shape[-1]
     low, high = ordered[..., (n - 1) // 2], ordered[..., n // 2]

@@ -1,4 +1,4 @@
-"""The runs of a sweep: one compiled program for each choice, fed in chunks that fit memory, split over the devices."""
+"""The runs of a sweep: one compiled program for each choice, fed with chunks that fit into memory, split over the devices."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from jaxveh.sweeps.swept import Swept, arrays_of, named_leaves
 from jaxveh.sweeps.workers import fit_for
 
 SHARE_OF_MEMORY = 0.5
-"""How much of the machine's memory a chunk may take, unless `memory` says otherwise."""
+"""Share of the machine's memory that a chunk may take, unless `memory` is given."""
 
 PATIENCE = 900.0
-"""How long a chunk may take until a word is said, s, unless `patience` says otherwise."""
+"""Time that a chunk may take before a warning, s, unless `patience` is given."""
 
 
 def sweep(
@@ -47,33 +47,33 @@ def sweep(
     units: Mapping[str, str] | None = None,
     note: str = "",
 ) -> Swept:
-    """`run` at every point of the design, each with the same seeds, so that points can be compared in pairs.
+    """Call `run` at every point of the design, always with the same seeds, so that points can be compared in pairs.
 
         sweep(lambda point, key: ..., design, seeds, key)             each seed is a key, split from `key`
         sweep(lambda point, drive: ..., design, data=drives)          each seed is a part of `data`: nothing is drawn
         sweep(lambda point, key, drive: ..., design, seeds, key, data=drives)
 
-    **Arguments**: `run`, a pure function of one point (a NamedTuple with the design's names) and of a key, of data or of both,
-    as they are given, whose result is a mapping or NamedTuple of arrays (trees of them get dotted names,
-    `parameters.front.B`); `seeds`, how many (with `data` as many as it has); `data`, a tree of arrays that begin with the axes
-    of numbers and the seeds: each run gets its own part (drives that several filters see); `batch`, runs at a time (default:
-    all points of a choice, or as many as `memory`, bytes, holds: half of the machine's); `devices`, over which a batch is
-    split by `shard_map` (default: all of `jax.devices()`: on a CPU one, unless `jax_num_cpu_devices` is set before jax starts;
-    a run that fits with optimistix takes one, `jax.devices()[:1]`: linear solves of lineax refuse `shard_map`); `patience`, s:
-    each time that a chunk, or compiling, has taken so long, a `JaxvehWarning` names it and says what can be done (None:
-    never); `progress(done, total, stage)` is called between chunks.
+    **Arguments**: `run`, a pure function of one point (a NamedTuple with the design's names) and of a key, of data or of
+    both, as given, that returns a mapping or NamedTuple of arrays (trees of them get dotted names, `parameters.front.B`);
+    `seeds`, how many (default: as many as in `data`); `data`, a tree of arrays that begin with the axes of numbers and the seeds:
+    each run gets its own part (drives for several filters); `batch`, runs at a time (default: all points of a choice, or as
+    many as fit into `memory`, bytes: half of the machine's); `devices`, over which a batch is split by `shard_map` (default:
+    all of `jax.devices()`: on a CPU one, unless `jax_num_cpu_devices` is set before jax starts; a run that fits with
+    optimistix takes one, `jax.devices()[:1]`: linear solves of lineax do not work under `shard_map`); `patience`, s: each
+    time that a chunk, or compiling, has taken this long, a `JaxvehWarning` names it and gives the remedy (None: never);
+    `progress(done, total, stage)` is called between chunks.
 
-    With `store`, a folder such as "sweep.zarr", each chunk of `batch` runs (1000) is written as it is done, and the same call
-    goes on there (see `sweeps/stored.py`): in this process, in `processes=N`, with a Dask `client=` (or a scheduler's address),
-    or one share `part=(i, n)` of an array of jobs; each with one device. `sweeps.read_sweep(store)` opens it again. `units` of
-    values and of axes by name, and a `note`, are shown and stored beside the numbers.
+    With `store`, a folder such as "sweep.zarr", each chunk of `batch` runs (1000) is written when it is done, and the same
+    call continues there (see `sweeps/stored.py`): in this process, in `processes=N`, with a Dask `client=` (or a scheduler's
+    address), or one share `part=(i, n)` of an array of jobs; each with one device. `sweeps.read_sweep(store)` opens it
+    again. `units` of values and axes by name, and a `note`, are shown and stored beside the numbers.
 
-    Every choice is compiled once, whatever the number of chunks; and again for fewer devices where as many as were asked for
-    could wait for each other for ever (large batches of LAPACK routines with jax before 0.12; see `sweeps/workers.py`).
+    Every choice is compiled once, whatever the number of chunks; and again for fewer devices if the devices could wait for
+    each other for ever (large batches of LAPACK routines with jax before 0.12; see `sweeps/workers.py`).
 
-    **Raises** `InputError` for bad counts, neither a key nor data, data of another shape, a `run` that returns nothing named, and
-    a store that was begun with something else or that another sweep is writing.
-    **Warns** where a program may never end even on one device, and what keeps it from that.
+    **Raises** `InputError` for bad counts, neither a key nor data, data of another shape, a `run` that returns nothing named,
+    and a store that was begun with something else or that another sweep is writing.
+    **Warns** if a program may never end even on one device, with the remedy.
     """
     check_positive("patience", patience, "s")
     if store is not None or (client, processes, part) != (None, None, None):
@@ -103,7 +103,7 @@ def _in_memory(run, design: Design, given: Given, batch, memory, devices, patien
 
 
 def _all(one, given: Given, batch, memory, devices, report, late) -> dict[str, np.ndarray]:
-    """All runs of one choice: values by name with (R, ...)."""
+    """All runs of one choice: values by name, (R, ...)."""
     batch = given.runs if batch is None else batch
     check_whole("batch", batch)
     with late("compiling"):
@@ -119,7 +119,7 @@ def _all(one, given: Given, batch, memory, devices, report, late) -> dict[str, n
 
 
 def _program(one, given: Given, batch, memory, devices):
-    """The compiled program of a chunk, and how many runs it takes: fewer than `batch` where they would not fit."""
+    """The compiled program of a chunk, and its number of runs: fewer than `batch` if they would not fit into memory."""
     check_positive("memory", memory, "bytes")
     memory = SHARE_OF_MEMORY * _machine_memory() if memory is None else memory
     while True:
@@ -145,7 +145,7 @@ def _split_over(one, devices):
 
 
 def _bytes_needed(program) -> float:
-    """Bytes that a compiled program takes while it runs; 0 where the backend does not say."""
+    """Bytes that a compiled program takes while it runs; 0 if the backend does not report them."""
     analysis = program.memory_analysis()
     if analysis is None:
         return 0.0
@@ -153,14 +153,14 @@ def _bytes_needed(program) -> float:
 
 
 def _machine_memory() -> float:
-    """Bytes; without end where the system does not say (Windows)."""
+    """Bytes; infinite if the system does not report them (Windows)."""
     if not hasattr(os, "sysconf"):
         return float("inf")
     return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
 
 
 def _arrange(design: Design, seeds: int, found: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Values by name with one axis for each of the design's, in its order, then the seeds."""
+    """Values by name with the design's axes in their order, then the seeds."""
     chosen = tuple(len(axis.values) for axis in design.choices)
     counted = tuple(len(axis.values) for axis in design.numbers)
     order = [*design.choices, *design.numbers]

@@ -1,4 +1,4 @@
-"""Points that fill a box: where a grid of every combination would take too many runs."""
+"""Points that fill a box, for designs where a grid of every combination would take too many runs."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ class Samples(NamedTuple):
 
 
 def latin_hypercube(count: int, *, seed: int = 0, **ranges: tuple[float, float]) -> Samples:
-    """`count` points, of which each name has one in each of `count` equal parts of its range (M. D. McKay et al. 1979).
+    """`count` points: for each name, one lies in each of `count` equal parts of its range (M. D. McKay et al. 1979).
 
         Design(car=latin_hypercube(500, mass=(1200.0, 1800.0), friction=(0.3, 1.1)))     run sees point.car.mass
 
-    `ranges`: (low, high) by name. The same `seed`, the same points.
+    `ranges`: (low, high) by name. The same `seed` gives the same points.
 
-    **Raises** `InputError` for no range, one that is not finite and rising, or a count below one.
+    **Raises** `InputError` for no range, a range that is not finite and increasing, or a count below one.
     """
     from scipy.stats import qmc
 
@@ -30,15 +30,15 @@ def latin_hypercube(count: int, *, seed: int = 0, **ranges: tuple[float, float])
 
 
 def sobol(count: int, *, seed: int = 0, **ranges: tuple[float, float]) -> Samples:
-    """`count` points, a power of two, of a scrambled Sobol sequence (I. M. Sobol 1967, A. B. Owen 1998); otherwise as
-    `latin_hypercube`. Averages over them err by about 1 / `count`, over random ones by 1 / sqrt(`count`)."""
+    """`count` points, a power of two, of a scrambled Sobol sequence (I. M. Sobol 1967, A. B. Owen 1998); otherwise like
+    `latin_hypercube`. Averages over them have an error of about 1 / `count`, over random points of 1 / sqrt(`count`)."""
     from scipy.stats import qmc
 
     check_whole("count", count)
     if count & (count - 1):
         below = 1 << (int(count).bit_length() - 1)
         raise InputError(
-            f"count = {count}: Sobol points are balanced in powers of two only; take {below} or {2 * below}."
+            f"count = {count}: Sobol points are balanced only for powers of two; take {below} or {2 * below}."
         )
     return _scaled(qmc.Sobol(len(ranges) or 1, rng=seed), count, ranges)
 
@@ -61,5 +61,5 @@ def _ends(name: str, ends: tuple[float, float]) -> tuple[float, float]:
     except (TypeError, ValueError):
         low, high = np.nan, np.nan
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise InputError(f"{name} = {ends!r}: must be (low, high), two finite numbers, the first the smaller.")
+        raise InputError(f"{name} = {ends!r}: must be (low, high), two finite numbers, the smaller one first.")
     return low, high

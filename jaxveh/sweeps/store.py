@@ -1,7 +1,7 @@
-"""A sweep's Zarr store: one array for each value, with the design's names, that xarray opens as it is.
+"""A sweep's Zarr store: one array for each value, with the design's names, which xarray opens directly.
 
-A chunk's values are written first, its mark in `chunk_status` last; each file is written beside its place and moved there. So
-what is marked is whole, whenever a process was killed, and what is not marked is computed again.
+A chunk's values are written first and its mark in `chunk_status` last; each file is written beside its place and then moved
+there. A marked chunk is therefore complete, whenever a process was killed; a chunk without a mark is computed again.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ MANIFEST = "jaxveh_sweep"
 """The attribute with the sweep's identity."""
 
 ABOUT = "jaxveh_about"
-"""The attribute with what is shown beside the numbers."""
+"""The attribute with the units and the note."""
 
 STATUS, ERROR = "chunk_status", "chunk_error"
 NOT_DONE, DONE, FAILED = 0, 1, 2
 
 LONGEST_ERROR = 1000
-"""Bytes of UTF-8 that are kept of a chunk's error."""
+"""Bytes of UTF-8 of a chunk's error that are kept."""
 
 
 class Store:
@@ -41,11 +41,11 @@ class Store:
         zarr = kit.require("zarr", "storing a sweep", "sweep")
         self.path = Path(path)
         if not (self.path / "zarr.json").exists():
-            raise InputError(f"{self.path}: no such store; it has no zarr.json.")
+            raise InputError(f"{self.path}: no such store: there is no zarr.json.")
         self.group = zarr.open_group(self.path, mode="r+")
         told = self.group.attrs.get(MANIFEST)
         if told is None:
-            raise InputError(f"{self.path}: a Zarr store, but no sweep's: it lacks the attribute {MANIFEST}.")
+            raise InputError(f"{self.path}: a Zarr store, but no sweep's: it does not have the attribute {MANIFEST}.")
         self.identity: dict[str, Any] = json.loads(told)
         self.about: dict[str, Any] = json.loads(self.group.attrs[ABOUT])
         axes = self.identity["design"]
@@ -60,7 +60,7 @@ class Store:
         self._chosen = tuple(i for i, is_choice in enumerate(self.is_choice.values()) if is_choice)
 
     def design(self) -> Design:
-        """The design, with labels instead of the objects that were chosen from."""
+        """The design, with labels instead of the objects to choose from."""
         design = Design()
         arrays = lambda columns: None if columns is None else {name: np.asarray(one) for name, one in columns.items()}
         design.axes = tuple(
@@ -75,11 +75,11 @@ class Store:
         return tuple(self.identity["values"])
 
     def check_units(self, units: Mapping[str, str]) -> None:
-        """Raise for other units than the store was begun with: they would go unseen."""
+        """Raise `InputError` for units other than those with which the store was begun; otherwise they would be ignored."""
         if units != self.about["units"]:
             raise InputError(
                 f"{self.path}: it was begun with units = {self.about['units']}, here they are {units}. Take another store, or "
-                "what it was begun with."
+                "the units with which it was begun."
             )
 
     def read(self, name: str) -> np.ndarray:
@@ -87,15 +87,15 @@ class Store:
         return np.asarray(self.group[name][...])
 
     def status(self) -> np.ndarray:
-        """Of each chunk: 0 not done, 1 done, 2 failed."""
+        """The status of each chunk: 0 not done, 1 done, 2 failed."""
         return np.asarray(self.group[STATUS][:])
 
     def is_done(self, number: int) -> bool:
-        """Whether a chunk is there, whoever has written it."""
+        """Whether a chunk is done, by any process."""
         return int(self.group[STATUS][number]) == DONE
 
     def error(self, number: int) -> str:
-        """Why a chunk failed."""
+        """The error with which a chunk failed."""
         return bytes(self.group[ERROR][number]).rstrip(b"\0").decode(errors="replace")
 
     def write(self, chunk: Chunk, values: Mapping[str, np.ndarray]) -> None:
@@ -106,14 +106,14 @@ class Store:
         self.group[STATUS][chunk.number : chunk.number + 1] = np.asarray([DONE], np.int8)
 
     def write_failure(self, number: int, error: str) -> None:
-        """Mark a chunk as failed, and say why."""
-        # Tracebacks say at their end what went wrong.
+        """Mark a chunk as failed, with its error."""
+        # The cause is at the end of a traceback.
         text = np.frombuffer(error.encode()[-LONGEST_ERROR:].ljust(LONGEST_ERROR, b"\0"), np.uint8)
         self.group[ERROR][number] = text
         self.group[STATUS][number : number + 1] = np.asarray([FAILED], np.int8)
 
     def _region(self, chunk: Chunk) -> tuple[slice, ...]:
-        """Where a chunk's values stand, along the design's axes and the seeds."""
+        """The slices of a chunk's values along the design's axes and the seeds."""
         choice = iter(np.unravel_index(chunk.choice, self._choices) if self._choices else ())
         block = iter(zip(chunk.start, chunk.size, strict=True))
         along = []
@@ -132,8 +132,8 @@ def create(
     values: Mapping[str, Any],
     about: Mapping[str, Any],
 ) -> Store:
-    """Make a store for values of these shapes and dtypes (of one run) by name; it is complete, or not there. `about`: `units` by
-    name and a `note`."""
+    """Make a store for values of these shapes and dtypes (of one run) by name; it is there only once it is complete.
+    `about`: `units` by name and a `note`."""
     zarr = kit.require("zarr", "storing a sweep", "sweep")
     if path.exists():
         raise InputError(f"{path}: exists and is no sweep's store; take another name.")
@@ -175,10 +175,10 @@ def create(
             raise InputError(f"units: {name} is neither a value nor an axis; there are: {', '.join(sorted(group))}.")
         group[name].attrs["units"] = unit
     group.attrs[ABOUT] = json.dumps(about)
-    # As text: what is compared later must come back as it was.
+    # As text, so that it is read back unchanged for later comparisons.
     group.attrs[MANIFEST] = json.dumps({**identity, "values": list(values)})
     with warnings.catch_warnings():
-        # xarray opens it faster, and says so where it is missing; others do not look at it.
+        # xarray opens the store faster with it, and warns without it; other readers ignore it.
         warnings.filterwarnings("ignore", "Consolidated metadata", UserWarning)
         zarr.consolidate_metadata(part)
     part.rename(path)
@@ -186,7 +186,7 @@ def create(
 
 
 def fill_value_of(dtype: Any) -> Any:
-    """What stands where nothing was computed: NaN, the least integer, or False."""
+    """The value of places that are not computed: NaN, the least integer, or False."""
     dtype = np.dtype(dtype)
     if dtype.kind in "fc":
         return dtype.type(np.nan)

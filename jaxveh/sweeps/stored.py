@@ -1,10 +1,11 @@
-"""A sweep into a store: what is done stays done, whoever is killed, and a second call goes on.
+"""A sweep into a store: finished chunks are kept if a process is killed, and a second call continues.
 
-Nothing but a chunk is kept in memory; the store has one Zarr array for each value, which xarray opens. It gives the same to the
-last bit however often it was interrupted and whoever did which chunk; another design, key, data, program, version, flag or
-processor in the same store is refused by name, and so is a second sweep at the same time. What a chunk needs is sent with it;
-workers write to the store themselves, which they must see under the same path. A dead worker's chunk is done again, and so is
-one that takes longer than `patience`; one that fails three times is recorded with its error, and tried again by the next call.
+Only one chunk is kept in memory; the store has one Zarr array for each value, which xarray opens. The result is the same to
+the last bit, however often the sweep was interrupted and whichever process computed a chunk. A store refuses another
+design, key, data, program, version, flag or processor, and names it; it also refuses a second sweep at the same time.
+Everything that a chunk needs is sent with it; workers write to the store themselves and must see it under the same path.
+The chunk of a dead worker is computed again, and so is one that takes longer than `patience`; one that fails three times is
+recorded with its error, and tried again by the next call.
 """
 
 from __future__ import annotations
@@ -36,13 +37,13 @@ from jaxveh.sweeps.store import DONE, FAILED, Store, create
 from jaxveh.sweeps.swept import Swept
 
 BATCH = 1000
-"""Runs of a chunk, where nobody says otherwise: not by this machine's memory, for the numbers must not depend on it."""
+"""Default number of runs of a chunk. It does not depend on this machine's memory, as the numbers must not depend on it."""
 
 SCRAPPED_AFTER = 3600.0
-"""s: age from which on half-written files are removed."""
+"""s: age from which on partly written files are removed."""
 
 PROBED = 1.0
-"""s: how long to wait for a lock, which another sweep may hold for a moment to see whether it is held."""
+"""s: how long to wait for a lock, which another sweep may hold for a moment to test it."""
 
 
 def sweep_into(
@@ -60,7 +61,7 @@ def sweep_into(
     units: Mapping[str, str],
     note: str,
 ) -> Swept:
-    """`sweep` with a store; arguments as there."""
+    """`sweep` with a store; the arguments are those of `sweep`."""
     check_whole("batch", BATCH if batch is None else batch)
     if client is not None and processes is not None:
         raise InputError("sweep: give client= or processes=, not both.")
@@ -93,7 +94,8 @@ def sweep_into(
 
 
 def _alone(computing: Computing, numbers: list[int], arguments, patience: float | None, told) -> None:
-    """All chunks in this process; what a chunk raises thrice is recorded, what the disk says ends the sweep."""
+    """All chunks in this process; an error that a chunk raises three times is recorded, an error of the disk ends the
+    sweep."""
     for number in numbers:
         given = arguments(number)
         with warn_when_late(f"chunk {number}", patience):
@@ -113,7 +115,7 @@ def _alone(computing: Computing, numbers: list[int], arguments, patience: float 
 def _begin(
     path: Path, run, design: Design, given: Given, batch: int | None, about: dict[str, Any]
 ) -> tuple[dict[int, Any], Store]:
-    """The store, begun or found with the same identity; and the programs, lowered, by the combination's number."""
+    """The store, new or found with the same identity; and the lowered programs by the combination's number."""
     if path.exists():
         store = Store(path)
         _remove_scraps(path)
@@ -125,7 +127,7 @@ def _begin(
         store, plan = None, plan_for(choices, given.shape, min(BATCH if batch is None else batch, given.runs))
     lowered, programs, values = {}, {}, None
     for i, (_, said, objects) in enumerate(design.combinations()):
-        # As many runs as the plan says, whatever they are: their shapes are what counts.
+        # Any runs, as many as in a chunk: only their shapes matter.
         lowered[i] = lower(run, design, objects, given.chunk(0, plan.batch))
         programs[said] = identity.of_program(lowered[i])
         shapes = {name: (leaf.shape[1:], leaf.dtype) for name, leaf in lowered[i].out_info.items()}
@@ -143,7 +145,7 @@ def _begin(
 
 
 def _remove_scraps(path: Path) -> None:
-    """Files that a killed process had begun to write, long enough ago that nobody writes them any more."""
+    """Remove files that a killed process left partly written, once they are too old to be in use."""
     for scrap in path.rglob("*.partial"):
         with contextlib.suppress(OSError):
             if time.time() - scrap.stat().st_mtime > SCRAPPED_AFTER:
@@ -152,7 +154,7 @@ def _remove_scraps(path: Path) -> None:
 
 @contextlib.contextmanager
 def _beginning(path: Path) -> Iterator[None]:
-    """Parts that start at once begin the store one after the other."""
+    """Let parts that start at the same time begin the store one after the other."""
     filelock = kit.require("filelock", "storing a sweep", "sweep")
     with filelock.FileLock(path.with_name(f".{path.name}.begin"), timeout=600):
         yield
@@ -160,9 +162,9 @@ def _beginning(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def only_one(path: Path, part: tuple[int, int] | None) -> Iterator[Callable[[int], bool]]:
-    """Hold the store, or one of its parts, against other sweeps while the block runs; gives which chunks are one's own.
+    """Lock the store, or one of its parts, against other sweeps while the block runs; gives a test for one's own chunks.
 
-    The locks are files beside the store. The system lets go of them when their process ends, however it ends.
+    The locks are files beside the store. The system releases them when their process ends, however it ends.
     """
     filelock = kit.require("filelock", "storing a sweep", "sweep")
     if part is not None and not (len(part) == 2 and 0 <= part[0] < part[1]):
@@ -183,7 +185,7 @@ def only_one(path: Path, part: tuple[int, int] | None) -> Iterator[Callable[[int
 
 @contextlib.contextmanager
 def _others(path: Path, part: tuple[int, int] | None, filelock: Any) -> Iterator[None]:
-    """Refuse what would share chunks: the whole beside a part, parts of another number."""
+    """Refuse sweeps that would share chunks: a whole sweep beside a part, or parts of another number."""
     own = "" if part is None else f"-of-{part[1]}.lock"
     for other in path.parent.glob(f".{path.name}.*lock"):
         if other.name.endswith(own) and part is not None and ".part-" in other.name:
@@ -202,7 +204,7 @@ def _others(path: Path, part: tuple[int, int] | None, filelock: Any) -> Iterator
 
 
 class Values(Mapping):
-    """A store's values by name, read when they are asked for."""
+    """A store's values by name, read on access."""
 
     def __init__(self, store: Store):
         self._store = store
@@ -220,10 +222,10 @@ class Values(Mapping):
 
 
 def read_sweep(path: str | os.PathLike) -> Swept:
-    """What is in a sweep's store, read value by value when asked for; choices by their labels.
+    """The content of a sweep's store, read value by value on access, with the labels of choices instead of the objects.
 
-    **Warns** (`JaxvehWarning`) of chunks that are not done, whose values are NaN (the least integer, False), and of those that
-    failed, with the first error.
+    **Warns** (`JaxvehWarning`) about chunks that are not done, whose values are NaN (the least integer, False), and about
+    those that failed, with the first error.
     """
     store = Store(path)
     _warn_of_missing(store, lambda number: True, stacklevel=3)
@@ -235,7 +237,7 @@ def _found(store: Store) -> Swept:
 
 
 def _warn_of_missing(store: Store, is_asked: Callable[[int], bool], stacklevel: int) -> None:
-    """Warn of chunks that were asked for and are not done."""
+    """Warn about chunks of this call that are not done."""
     status = store.status()
     missing = [int(i) for i in np.flatnonzero(status != DONE) if is_asked(int(i))]
     if not missing:
@@ -250,6 +252,6 @@ def _warn_of_missing(store: Store, is_asked: Callable[[int], bool], stacklevel: 
 
 
 def _last_line(error: str) -> str:
-    """Of an error's words the last line, which says what went wrong where there are many."""
+    """The last line of an error, which contains the cause if there are several lines."""
     lines = [line.strip() for line in error.splitlines() if line.strip()]
     return lines[-1] if lines else "no reason was given"

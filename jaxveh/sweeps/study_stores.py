@@ -1,4 +1,4 @@
-"""The stores of a study that has several sweeps: one each, in one folder."""
+"""The stores of a study with several sweeps: one store per sweep, in one folder."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from jaxveh.sweeps.store import DONE, Store
 from jaxveh.sweeps.swept import Swept, named_leaves
 
 RUNS = 100
-"""Runs of a chunk, unless a study says otherwise. A run is a whole drive, or a filter over one that keeps rows: up to four
-megabytes, so that a chunk fits every machine. Round numbers of seeds are cut without a rest."""
+"""Default number of runs of a chunk. A run is a whole drive, or a filter over a drive that keeps rows: up to four
+megabytes, so that a chunk fits every machine. Round numbers of seeds are cut without a remainder."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Stores:
-    """Where the sweeps of a study go: NAME.zarr in the `folder`; without one they stay in memory.
+    """Where the sweeps of a study go: NAME.zarr in the `folder`; without a folder they stay in memory.
 
-    They are computed in this process, in so many `processes`, or by a Dask `client` (or a scheduler's address).
+    They are computed in this process, in this number of `processes`, or by a Dask `client` (or a scheduler's address).
 
-    **Raises** `InputError` for processes or a client without a folder, and for both of them.
+    **Raises** `InputError` for processes or a client without a folder, and for both together.
     """
 
     folder: str | os.PathLike | None = None
@@ -38,14 +38,16 @@ class Stores:
 
     def __post_init__(self):
         if self.folder is None and (self.processes, self.client) != (None, None):
-            raise InputError("stores: processes= and client= need a folder=; without one this process computes.")
+            raise InputError(
+                "stores: processes= and client= need a folder=; without a folder the sweeps run in this process."
+            )
         if self.processes is not None and self.client is not None:
             raise InputError("stores: give client= or processes=, not both.")
         if self.processes is not None:
             check_whole("processes", self.processes)
 
     def under(self, name: str) -> Stores:
-        """The stores of a part of the study: those in the folder's folder of this name."""
+        """The stores of a part of the study: those in the subfolder of this name."""
         return self if self.folder is None else dataclasses.replace(self, folder=Path(self.folder) / name)
 
     def sweep(
@@ -61,12 +63,12 @@ class Stores:
         devices: list | None = None,
         progress: Progress = silent,
     ) -> Swept:
-        """`sweeps.sweep`, in the store of this `name` if there are stores: what is there already is read and not computed.
+        """`sweeps.sweep`, in the store of this `name` if there are stores: finished chunks are read and not computed.
 
-        Arguments are those of `sweeps.sweep`; `devices` are for a sweep without a store. Chunks of a store have `batch` or `RUNS`
-        runs. What it returns is in memory: the tables of a study read each value many times.
+        Arguments are those of `sweeps.sweep`; `devices` are for a sweep without a store. Chunks of a store have `batch` or
+        `RUNS` runs. The result is in memory: the tables of a study read each value many times.
 
-        **Raises** `InputError` as `sweeps.sweep` does, and where chunks have failed: what follows would lack them.
+        **Raises** `InputError` as `sweeps.sweep` does, and if chunks have failed: the study needs all of them.
         """
         if self.folder is None:
             return sweep(run, design, seeds, key, data=data, batch=batch, devices=devices, progress=progress)
@@ -78,13 +80,14 @@ class Stores:
         missing = int(np.sum(Store(path).status() != DONE))
         if missing:
             raise InputError(
-                f"{path}: what follows needs the {missing} chunks that are not done. Start again to try them."
+                f"{path}: the study needs the {missing} chunks that are not done. Start again to compute them."
             )
-        # The choices themselves, of which a store has the labels.
+        # The choices themselves, as a store has only their labels.
         return Swept(design, found.seeds, dict(found.values))
 
     def each(self, name: str, function: Callable[..., Any], *arguments: Any, progress: Progress = silent) -> Any:
-        """`jax.vmap(function)(*arguments)`, trees of arrays alike in their first axis, by a sweep of this `name` over its rows.
+        """`jax.vmap(function)(*arguments)` for trees of arrays with the same first axis, as a sweep of this `name` over its
+        rows.
 
         **Raises** `InputError` as `sweep` does.
         """
@@ -100,7 +103,7 @@ class Stores:
 
         def noted(*given: Any) -> Any:
             result = function(*given)
-            # A shape does not say what kind of key it is of.
+            # A shape does not contain the kind of a key.
             kinds_found[:] = _kinds(result)
             return result
 
@@ -111,13 +114,13 @@ class Stores:
 
 
 def _kinds(tree: Any) -> list[str]:
-    """Of each leaf what kind of key it is; empty where it is none."""
+    """The kind of key of each leaf; empty if it is no key."""
     is_key = lambda leaf: jax.numpy.issubdtype(jax.numpy.asarray(leaf).dtype, jax.dtypes.prng_key)
     return [str(jax.random.key_impl(leaf)) if is_key(leaf) else "" for leaf in jax.tree.leaves(tree)]
 
 
 def _words(tree: Any) -> Any:
-    """The tree with keys as their words: neither data nor a store have keys."""
+    """The tree with keys replaced by their words: neither data nor a store can have keys."""
     leaves, structure = jax.tree.flatten(tree)
     leaves = [jax.numpy.asarray(leaf) for leaf in leaves]
     keys = zip(leaves, _kinds(leaves), strict=True)
@@ -125,7 +128,7 @@ def _words(tree: Any) -> Any:
 
 
 def _keyed(tree: Any, kinds: list[str]) -> Any:
-    """What `_words` was given, of these kinds."""
+    """The tree that was given to `_words`, with keys of these kinds."""
     leaves, structure = jax.tree.flatten(tree)
     words = zip(leaves, kinds, strict=True)
     return jax.tree.unflatten(

@@ -1,4 +1,4 @@
-"""What a sweep found: arrays by name over the design's axes and the seeds."""
+"""The result of a sweep: arrays by name over the design's axes and the seeds."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from jaxveh.sweeps.paired import Comparison, compare
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Swept(Kept):
-    """`values` by name, each with the design's axes, then the `seeds`, then what a run's own value has.
+    """`values` by name, each with the design's axes, then the `seeds`, then the axes of a run's own value.
 
-    Where runs return trees, such as an estimate's `parameters`, `found["parameters"]` is all of them, `Parameters` again, and
-    `found["parameters.front.B"]` one; so it is in `at`, `quantile` and what follows from it. `units` by the
-    names of values and axes, and a `note` on what it is, are those that the sweep was given.
+    If runs return trees, such as an estimate's `parameters`, `found["parameters"]` is all of them as `Parameters`, and
+    `found["parameters.front.B"]` is one of them; the same holds in `at`, `quantile` and the methods that use it. `units` by
+    the names of values and axes, and a `note`, are those that `sweep` got.
 
-    `to_xarray` is as xarray opens a sweep's store: dimensions are the axes and `seed`. What comes back has the labels of choices
-    instead of the objects, as `read_sweep` does; `load` opens stores (`.zarr`), too.
+    `to_xarray` gives the same as xarray does from a sweep's store: dimensions are the axes and `seed`. Read back, it has
+    the labels of choices instead of the objects, as with `read_sweep`; `load` also opens stores (`.zarr`).
     """
 
     design: Design
@@ -41,21 +41,21 @@ class Swept(Kept):
     note: str = ""
 
     def unit(self, name: str) -> str:
-        """The unit of a value or an axis, `-` where none was given."""
+        """The unit of a value or an axis; `-` if none was given."""
         return self.units.get(name, "-")
 
     def plot(self, value: str | None = None) -> Any:
-        """The first figure that `studies.figures` has of a value (default: the first error, or value). **Returns** the figure."""
+        """The first figure of `studies.figures` for a value (default: the first error, or value). **Returns** the figure."""
         return next(above("studies.figures", "figures")(self, () if value is None else (value,)))[1]
 
     def to_pandas(self) -> Any:
-        """A `pandas.DataFrame` with a row a run: a column an axis, `seed`, and a column a value; what a run has more than one of
-        is taken apart (`name[0]`)."""
+        """A `pandas.DataFrame` with one row per run: a column per axis, `seed`, and a column per value; a value with
+        several numbers per run becomes several columns (`name[0]`)."""
         return super().to_pandas()
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> Swept:
-        """What `save` wrote, or a sweep's store (`.zarr`), as `read_sweep`."""
+        """Read a file of `save`, or a sweep's store (`.zarr`) as `read_sweep` does."""
         if str(path).lower().rstrip("/").endswith(".zarr"):
             return above("sweeps", "read_sweep")(path)
         return super().load(path)
@@ -97,14 +97,14 @@ class Swept(Kept):
         axes = [f"{axis.name} ({len(axis.labels)})" for axis in self.design.axes]
         title = f"Swept: {count_of(len(self.values), 'value')} over {' x '.join([*axes, count_of(self.seeds, 'seed')])}"
         title += f", {self.note!r}" if self.note else ""
-        # A store's values are read when they are asked for, and may be larger than the memory.
+        # A store's values are read on access, and may be larger than the memory.
         if not isinstance(self.values, dict):
             return Overview(title, ("value", "unit"), [(name, self.unit(name)) for name in self.values], 2)
         row = lambda name: (name, self.unit(name), *span(self.values[name]), missing_share(self.values[name]))
         return Overview(title, ("value", "unit", "least", "most", "missing"), Lazy(list(self.values), row), 2)
 
     def __getitem__(self, name: str) -> Any:
-        """All values of this name, (axes..., seeds, ...), or `Parameters` of those that begin with it and a dot."""
+        """All values of this name, (axes..., seeds, ...), or `Parameters` of those whose names begin with it and a dot."""
         if not any(one == name or one.startswith(f"{name}.") for one in self.values):
             check_names("value", (name,), self.values)
         return Parameters(self.values)[name]
@@ -144,11 +144,11 @@ class Swept(Kept):
 
 
 SEED, OWN = "seed", "_of_"
-"""The dimension of runs, and what stands in the names of dimensions of a run's own value."""
+"""The dimension of runs, and the middle part of the names of dimensions of a run's own value."""
 
 
 def _plain(label: Any) -> Any:
-    """A label as JSON has it."""
+    """A label in the form of JSON."""
     return label if isinstance(label, bool | int | float | str) else str(label)
 
 
@@ -158,7 +158,7 @@ def _quantile(values: np.ndarray, share: float, axis: int) -> np.ndarray:
 
 
 def named_leaves(tree: Any) -> dict[str, Any]:
-    """The leaves of a tree of mappings and NamedTuples by dotted names; a lone leaf's is empty."""
+    """The leaves of a tree of mappings and NamedTuples by dotted names; the name of a lone leaf is empty."""
     pairs = jax.tree_util.tree_leaves_with_path(tree)
     return {".".join(_word(step) for step in path): leaf for path, leaf in pairs}
 
@@ -171,7 +171,7 @@ def _word(step: Any) -> str:
 
 
 def arrays_of(result):
-    """The result's arrays, or an `InputError`."""
+    """The result's arrays. Raises `InputError` for anything else."""
     named = named_leaves(result)
     if not named or any(not name for name in named):
         raise InputError(
@@ -180,5 +180,5 @@ def arrays_of(result):
         )
     bad = [name for name, leaf in named.items() if not eqx.is_array_like(leaf)]
     if bad:
-        raise InputError(f"run: {', '.join(bad)} of its result are no arrays.")
+        raise InputError(f"run: {', '.join(bad)} in its result must be arrays.")
     return {name: jnp.asarray(leaf) for name, leaf in named.items()}

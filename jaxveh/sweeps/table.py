@@ -1,4 +1,4 @@
-"""Tables for people."""
+"""Tables to print."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 
 class Table(NamedTuple):
-    """A table for people: a title that says what the numbers are, column heads, rows of cells; `left`: how many of the first
-    columns are words."""
+    """A table to print: a `title` that describes the numbers, heads of the `columns`, `rows` of cells; `left`: how many of
+    the first columns are text."""
 
     title: str
     columns: tuple[str, ...]

@@ -1,10 +1,10 @@
-"""How many devices of a CPU may run a program at once, where its kernels wait for each other's workers.
+"""How many devices of a CPU may run a program at once, if its kernels wait for each other's workers.
 
 jaxlib 0.9.1 to 0.11 hands a large batch of a LAPACK routine (factorisations, eigenvalues, triangular solves) in parts to the
-pool of worker threads that all devices of a process share, and waits for them; XLA's FFT does the same. Where such a kernel
-runs on a worker itself, the worker is blocked. Once all of them are, nobody is left for the parts, and the program never ends.
-At least one free worker is all that it takes, for the parts themselves wait for nothing. More workers than cores would do, too,
-but make every program slower (two devices on two cores: 1.3 times as fast as one with three workers, 1.9 times with two).
+pool of worker threads that all devices of a process share, and waits for them; XLA's FFT does the same. If such a kernel runs
+on a worker itself, that worker is blocked. Once all workers are blocked, none is left for the parts, and the program never
+ends. One free worker is enough, because the parts themselves wait for nothing. More workers than cores would also help, but
+make every program slower (two devices on two cores: 1.3 times as fast as one with three workers, 1.9 times with two).
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ import jax
 from jaxveh._core.errors import JaxvehWarning
 
 WHOLE_AGAIN = (0, 12)
-"""The first jax whose LAPACK kernels take a batch by themselves."""
+"""The first jax whose LAPACK kernels compute a batch without other workers."""
 
 LARGE = 200_000
 """Operations of a batch from which on it is handed out in parts."""
 
 POOL = "PJRT_NPROC"
-"""The variable that says how many workers there are, read when jax makes its devices; otherwise as many as there are cores."""
+"""The variable with the number of workers, read when jax makes its devices; without it there are as many as cores."""
 
 COST = {"potrf": 1 / 3, "trsm": 1.0, "getrf": 1.0, "geqrf": 2.0, "orgqr": 4.0}
-"""Operations for a matrix of n rows over n^3, as jaxlib counts them, at most; of other routines ten."""
+"""Operations for a matrix of n rows, divided by n^3, as jaxlib counts them, at most; ten for other routines."""
 
 _KERNEL = re.compile(r"= (?P<shapes>.*?) custom-call\(.*custom_call_target=\"lapack_(?P<kind>\w)(?P<routine>[a-z]+)_")
 _HEADER = re.compile(r"^(ENTRY )?(?P<name>%[\w.\-]+) .*\{$")
@@ -40,7 +40,7 @@ _SHAPE = re.compile(r"\w+\[([\d,]*)\]")
 def fit_for(program: Any, devices: list) -> list:
     """As many of `devices` as can run a compiled program without ever blocking all workers; at least one.
 
-    Warns where even one may not: a program in which as many kernels may wait at once as there are workers.
+    Warns if even one may block them all: a program in which as many kernels may wait at once as there are workers.
     """
     if devices[0].platform != "cpu":
         return devices
@@ -60,7 +60,7 @@ def fit_for(program: Any, devices: list) -> list:
 
 
 def places_that_wait(text: str) -> int:
-    """How many kernels of a compiled program (its HLO as text) may wait for the pool at the same time, at most."""
+    """The largest number of kernels of a compiled program (its HLO as text) that may wait for the pool at the same time."""
     most: dict[str, int] = {}
     entry = 0
     for name, lines in _computations(text):
@@ -69,7 +69,7 @@ def places_that_wait(text: str) -> int:
 
 
 def _computations(text: str) -> list[tuple[str, list[str]]]:
-    """The instructions of each computation by its name; those that are called come before those that call."""
+    """The instructions of each computation by its name; computations come before those that call them."""
     found: list[tuple[str, list[str]]] = []
     for line in text.splitlines():
         header = _HEADER.match(line)
@@ -81,10 +81,10 @@ def _computations(text: str) -> list[tuple[str, list[str]]]:
 
 
 def _at_once(lines: list[str], most: dict[str, int]) -> int:
-    """How many kernels of one computation may run at once: kernels that need each other's results form a chain, of which one
-    runs at a time; an instruction that calls computations counts as many as those have."""
-    needs: dict[str, int] = {}  # by instruction: the waiting ones that it follows from, a bit each
-    chains: list[tuple[int, int]] = []  # the last waiting one, and the most that one of the chain counts
+    """The number of kernels of one computation that may run at once. Kernels that need each other's results form a chain, of
+    which one runs at a time; an instruction that calls computations counts as many kernels as they have."""
+    needs: dict[str, int] = {}  # by instruction: the waiting kernels from which it follows, one bit each
+    chains: list[tuple[int, int]] = []  # the last waiting kernel, and the largest count in the chain
     waiting = 0
     for line in lines:
         own, _, rest = line.partition(" = ")
@@ -110,7 +110,7 @@ def _waits(line: str) -> bool:
 
 
 def workers() -> int:
-    """How many worker threads the process has: one a core or what `POOL` (or NPROC) says, at least one a device."""
+    """The number of worker threads of the process: one per core or the value of `POOL` (or NPROC), at least one per device."""
     told = os.environ.get(POOL) or os.environ.get("NPROC")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(int(told) if told else cores, len(jax.devices("cpu")))

@@ -285,7 +285,7 @@ def test_bad_input_is_one_line_and_writes_nothing(tmp_path, arguments, words):
 def test_an_event_that_the_car_cannot_have_is_refused(tmp_path):
     result = simulate(*QUICK, "--until", "wheel-lift", "-o", tmp_path / "out.csv")
     assert result.exit_code == 2
-    assert result.stderr.splitlines()[-1].startswith("error: wheel_lift: the car has no loads a wheel")
+    assert result.stderr.splitlines()[-1].startswith("error: wheel_lift: the car has no load per wheel")
     assert list(tmp_path.iterdir()) == []
 
 

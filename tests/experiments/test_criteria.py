@@ -55,7 +55,7 @@ def test_a_check_of_every_criterion_has_its_terms(name):
     assert [check.name for check in checks] == list(criteria)
     assert all(Terms(check.condition, check.original) == criteria[check.name] for check in checks)
     assert tally(checks).of == number_asked(criteria)
-    with pytest.raises(InputError, match="not looked at"):
+    with pytest.raises(InputError, match="not checked"):
         with_terms([at_most(one, 0.0, 1.0) for one in list(criteria)[1:]], criteria)
     with pytest.raises(InputError, match="without terms: .'more'"):
         with_terms([*checks, at_most("more", 0.0, 1.0)], criteria)

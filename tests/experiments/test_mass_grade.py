@@ -291,7 +291,7 @@ def test_claims_are_judged_by_intervals_and_shown_beside_doing_nothing():
     raced = made_up(SMALL, **{"AUKF": 0.02, "UKF": 0.01, "gated": 0.3, "first guess": 0.4})
     rows = {claim: rest for _, claim, *rest in claims_table(raced).rows}
     better, gate, worst = (
-        next(row for claim, row in rows.items() if what in claim) for what in ("ends", "stops", "final")
+        next(row for claim, row in rows.items() if what in claim) for what in ("final mass of", "stops", "final error")
     )
     assert better[0].startswith("2 ") and better[2].startswith("0.05 ") and better[-1] == FAILED
     assert gate[0].startswith("0.0667") and gate[-1] == MET

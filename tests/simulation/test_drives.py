@@ -103,7 +103,7 @@ def test_a_wheel_that_lifts_ends_a_drive():
     assert "wheel lift" in drive.source and drive.time[-1] < 1.5
     least = min(float(drive[f"true.load_{wheel}"][-1]) for wheel in ("fl", "rl"))
     assert 0.0 <= least < 200.0
-    with pytest.raises(InputError, match="no loads a wheel"):
+    with pytest.raises(InputError, match="no load per wheel"):
         simulate(vehicles.passenger_car(), straight(), until=simulation.wheel_lift())
 
 

@@ -104,5 +104,5 @@ def test_an_event_in_one_run_of_a_batch_leaves_the_others_whole():
 def test_stamps_that_are_one_in_float32_are_refused():
     car, long = cast((linear(), manoeuvres.step_steer(25.0, 0.02, duration=40.0)), np.float32)
     close = sensors.Suite((sensors.GNSS(rate=1.0), sensors.IMU(rate=1.0, phase=1e-6)))
-    with pytest.raises(InputError, match=r"rows at t = \d+ s and 1e-06 s later are one instant in float32"):
+    with pytest.raises(InputError, match=r"rows at t = \d+ s and 1e-06 s later coincide in float32"):
         simulate(car, long, close, max_step=0.1)

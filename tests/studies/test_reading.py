@@ -65,7 +65,7 @@ BAD = {
     "[told]\nfront.Q = 1.0": "no number of SingleTrack 'front.Q'",
     '[sensors]\ndevices = "radar"': "sensors.devices = 'radar': must be one of",
     "[sensors]\nyaw_rate = -1.0": "-1.0",
-    '[sensors]\ndevices = "none"\nyaw_rate = 0.1': "of devices that measure nothing",
+    '[sensors]\ndevices = "none"\nyaw_rate = 0.1': "devices that measure nothing",
     '[sensors]\ndevices = "production"': "[measurement_noise]",
     "[process_noise]\nspin = 1.0": "spin",
     'estimator = "sideslipp"': "no estimator 'sideslipp' (did you mean 'sideslip'?)",

@@ -1,4 +1,4 @@
-"""The estimators by name: what each knows of the others, and how it goes about the sensors."""
+"""The estimators by name: what each of them gets from the others, and how it uses the sensors."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Study
 from jaxveh.statespace import Continuous, Gaussian, Prior, StateSpace, kit
 
 GROUPS = (("a_x", "a_y"), ("yaw_rate",), WHEELS)
-"""Disjoint sensors, a group for each device: accelerometers, gyroscope, wheel speeds."""
+"""Disjoint sensors, one group per device: accelerometers, gyroscope, wheel speeds."""
 
 SHARED = (CHANNELS, ("a_y", "yaw_rate"))
-"""As the paper's Z_1 and Z_2, with the wheel speeds in the first: what the second has the first has, too."""
+"""The paper's Z_1 and Z_2, with the wheel speeds in the first: the first contains all of the second."""
 
 
 class Found(NamedTuple):
     """Estimates over time, (T,): speeds (m/s), yaw rate (rad/s), and (T, 4) `parameters` in physical units.
 
-    `vector` (T, 7) and `covariance` (T, 7, 7) are what the estimator believes of three states and the logarithms of four
-    parameters; the parameters' covariance is zero where they are taken for certain.
+    `vector` (T, 7) and `covariance` (T, 7, 7) are the estimator's mean and covariance of three states and the logarithms of
+    four parameters; the covariance of parameters that it takes as certain is zero.
     """
 
     v_x: Any
@@ -48,50 +48,53 @@ class Found(NamedTuple):
 
 
 class Contestant(NamedTuple):
-    """`run(study, start, drive) -> Found`, and what it is, in words."""
+    """`run(study, start, drive) -> Found`, and a description, `what`."""
 
     run: Callable[[Study, Any, Drive], Found]
     what: str
 
 
 def contestants(study: Study) -> dict[str, Contestant]:
-    """All of them by name, the do-nothing one first."""
+    """All estimators by name, beginning with the one that does nothing."""
     cubature = filters.Cubature()
     shared = filters.Federated(cubature, SHARED, by_trace=True, overlapping=True)
     apart = filters.Federated(cubature, GROUPS, common=True)
     isolating = filters.Federated(cubature, GROUPS, common=True, isolate=study.isolate)
     return {
-        "first guess": Contestant(_guess, "the parameters are the first guess; states by a cubature filter"),
+        "first guess": Contestant(_guess, "parameters stay at the first guess; states by a cubature filter"),
         "joint": Contestant(_joint(cubature), "one cubature filter of states and parameters, all sensors"),
         "joint, gated": Contestant(
-            _joint(filters.Gated(cubature, study.gate)), f"the same; innovations beyond {study.gate:g} sigma left out"
+            _joint(filters.Gated(cubature, study.gate)), f"the same, without innovations beyond {study.gate:g} sigma"
         ),
         "three interleaved": Contestant(
-            _three(cubature), "three cubature filters that believe each other's means; our noises"
+            _three(cubature), "three cubature filters that take each other's means as certain; our noises"
         ),
         "three federated, shared sensors": Contestant(
-            _three(shared), "the paper's structure: each of the three has two locals with the same sensors; our noises"
+            _three(shared),
+            "the paper's structure: each of the three has two local filters with the same sensors; our noises",
         ),
         "three considered": Contestant(
             _joint(filters.Dual(cubature, BLOCKS)),
-            "three that consider each other's spreads, but forget what they share",
+            "three that allow for each other's standard deviations, but drop their cross-covariances",
         ),
         "redesigned": Contestant(
             _joint(apart),
-            "covariances among the three are kept; a local filter for each device has the whole prediction",
+            "cross-covariances of the three are kept; one local filter per device, each with the whole prediction",
         ),
-        "redesigned, isolating": Contestant(_joint(isolating), "the same; a device that surprises is left out"),
+        "redesigned, isolating": Contestant(
+            _joint(isolating), "the same; a device with too large innovations is left out"
+        ),
     }
 
 
 def with_shares() -> Contestant:
-    """The redesign with N. Carlson's shares instead of a common prediction."""
-    what = "as the redesigned, but each local has a third of the information, and its points lie sqrt(3) as far out"
+    """The redesign with N. Carlson's shares of information instead of a common prediction."""
+    what = "as redesigned, but each local filter has a third of the information, and its points lie sqrt(3) as far out"
     return Contestant(_joint(filters.Federated(filters.Cubature(), GROUPS)), what)
 
 
 BLOCKS = (State._fields, ("mass", "yaw_inertia", "front_axle_to_cg"), ("friction",))
-"""What the three estimators estimate."""
+"""The quantities of the three estimators."""
 
 
 def _guess(study: Study, start: Any, drive: Drive) -> Found:
@@ -119,7 +122,7 @@ def _result(vector: Any, covariance: Any) -> Found:
 
 
 def _with_parameters(names: tuple[str, ...]):
-    """Parameters by their logarithms into the car."""
+    """A function that puts parameters, given by their logarithms, into the car."""
 
     def put(car, x):
         where = lambda car: [getattr(car, name) for name in names]
@@ -172,8 +175,8 @@ def _three(filter_: Any):
 def metrics(study: Study, found: Found, drive: Drive, truth: Any) -> dict[str, Any]:
     """Errors of a run: `<parameter>_error` (shares, at the end), `sideslip_rmse` (degrees, from `settled` on) and
     `sideslip_rmse_fault` (during the fault), `nees` of the parameters at the end and `nees_all` of states and parameters
-    (mean from `settled` on), over their dimensions; `v_x_rmse` and `v_y_rmse` (m/s, from `settled` on); the estimates, ten a
-    second.
+    (mean from `settled` on), both divided by their dimensions; `v_x_rmse` and `v_y_rmse` (m/s, from `settled` on); and ten
+    estimates per second.
     """
     t = times(study)
     later, wrong = t >= study.settled, (t >= study.fault_at) & (t < study.fault_at + study.fault_time)
@@ -209,7 +212,7 @@ def _count(rows: Any) -> Any:
 
 
 def _squared_distance(error: Any, covariance: Any) -> Any:
-    """e^T P^-1 e; infinite where nothing is believed uncertain."""
+    """e^T P^-1 e; infinite if a variance is zero."""
     std = jnp.sqrt(jnp.diagonal(covariance))
     factor = numerics.cholesky(covariance / (std[:, None] * std[None, :]))
     value = numerics.mahalanobis(factor, error / std)

@@ -1,4 +1,4 @@
-"""The drives: a car with a motor in each wheel through a slalom on a slippery road."""
+"""The drives: a car with a motor in each wheel on a slalom on a slippery road."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STEERS = vehicles_kit.wheel_names("steer")
 
 
 class Drive(NamedTuple):
-    """What filters may see, (T,) each, and the truth.
+    """The channels that filters may use, (T,) each, and the truth.
 
     Measured: `a_x`, `a_y` (m/s^2), `yaw_rate` (rad/s), `omega` of the wheels (rad/s; (T, 4): front left, front right, rear left,
     rear right). Known: `steer` of the wheels (rad, (T, 4)), `torque` of the motors (N m, (T, 4)). Truth: `true_v_x`, `true_v_y`
@@ -50,8 +50,8 @@ class Drive(NamedTuple):
 
 
 class Slalom(AbstractManoeuvre):
-    """A sine of `steer` (rad) and `frequency` (Hz) at a speed that varies; the first second is faded in. The rear wheels turn by
-    `rear` (-) times as much: it says all four angles."""
+    """A sine of `steer` (rad) and `frequency` (Hz) at a varying speed; it fades in over the first second. The rear wheels
+    turn by `rear` (-) times as much: the manoeuvre gives all four angles."""
 
     speed: AbstractSpeed
     duration: float = eqx.field(static=True)
@@ -67,7 +67,7 @@ class Slalom(AbstractManoeuvre):
 
 
 def with_four_angles(u: DriverInputs, rear: Any) -> Any:
-    """A driver's inputs with the angle of each wheel, that of the rear ones `rear` (-) times that of the front ones."""
+    """A driver's inputs with the angle of each wheel; the rear angles are `rear` (-) times the front angles."""
     angles = (u.steer, u.steer, rear * u.steer, rear * u.steer)
     return record("DriverInputs", u._asdict() | dict(zip(STEERS, angles, strict=True)))
 
@@ -78,14 +78,15 @@ def times(study: Study) -> jax.Array:
 
 
 def dugoff(study: Study) -> Dugoff:
-    """The paper's tyre, whose friction is the road's."""
+    """The paper's tyre, with the friction of the road."""
     numbers = sets.ev().front
     assert numbers is not None and numbers.slip_stiffness is not None
     return Dugoff(numbers.slip_stiffness, numbers.cornering_stiffness, friction=1.0, fading=study.fading)
 
 
 def peaked_tyre() -> Similarity:
-    """A Magic Formula of ordinary shape, as stiff as the paper's tyre at a wheel's mean load; less friction shrinks its curve."""
+    """A Magic Formula of ordinary shape, as stiff as the paper's tyre at a wheel's mean load; less friction scales its curve
+    down."""
     numbers = sets.ev()
     assert numbers.front is not None and numbers.front.slip_stiffness is not None
     load, stiffness = 0.5 * sum(numbers.wheel_loads()), numbers.front.cornering_stiffness
@@ -94,13 +95,13 @@ def peaked_tyre() -> Similarity:
 
 
 def truth_of(study: Study, magic_formula: bool = False) -> SevenDOF:
-    """The true car: on Dugoff's tyres, or on others of the same stiffness and peak friction, but with a peak."""
+    """The true car: on Dugoff's tyres, or on tyres of the same stiffness and peak friction whose curve has a peak."""
     tyre = peaked_tyre() if magic_formula else dugoff(study)
     return vehicles.build(sets.ev(), SevenDOF, front=tyre, rear=tyre, steering=vehicles.IndependentSteering())
 
 
 def drive_once(study: Study, steer, speed_std, key, *, magic_formula: bool = False) -> Drive:
-    """One drive with a steer amplitude (rad) and a spread of the speed (m/s); a pure function, for `vmap`."""
+    """One drive with a steer amplitude (rad) and a standard deviation of the speed (m/s); a pure function, for `vmap`."""
     slalom = lambda speed: Slalom(speed=speed, duration=study.duration, frequency=study.steer_frequency, steer=steer)
     return drive_on(study, roads.Level(study.friction), slalom, speed_std, key, magic_formula=magic_formula)
 
@@ -109,7 +110,7 @@ def drive_on(
     study: Study, road: roads.AbstractRoad, driver: Callable[[AbstractSpeed], Any], speed_std, key,
     *, magic_formula: bool = False,
 ) -> Drive:  # fmt: skip
-    """One drive on a road, `driver` making who steers of the speed, which wavers about the study's by `speed_std` (m/s)."""
+    """One drive on a road: `driver` makes the driver from the speed, which varies about the study's by `speed_std` (m/s)."""
     speed_key, sensor_key = jax.random.split(key)
     speed = manoeuvres.wavering_speed(
         study.speed, speed_std, speed_key, time=study.speed_time, fastest=study.speed_fastest, count=20
@@ -137,11 +138,11 @@ def drive_on(
 
 
 def wheel_rates(study: Study, drive: Drive) -> jax.Array:
-    """Accelerations of the wheels from what they measured until now, rad/s^2, (T, 4): differences over `rate_time`, or as far
-    back as there are rows.
+    """Accelerations of the wheels from their past speeds, rad/s^2, (T, 4): differences over `rate_time`, or over as many
+    rows as there are.
 
-    Over one row their noise would be that of 4.6 N at the tread, and the same noise is in the wheel speeds that the
-    filter is given: friction then comes out one per cent too large.
+    Over one row their noise would correspond to 4.6 N at the tread. The wheel speeds of the filter's measurements contain
+    the same noise; friction would then be estimated one per cent too large.
     """
     n, rows = round(study.rate_time / study.dt), np.arange(drive.omega.shape[0])
     back = np.maximum(rows - n, 0)
@@ -150,7 +151,7 @@ def wheel_rates(study: Study, drive: Drive) -> jax.Array:
 
 
 def felt_accelerations(study: Study, drive: Drive) -> tuple[jax.Array, jax.Array]:
-    """What the loads follow (m/s^2, (T,) each): the measured accelerations behind the lag of roll and pitch."""
+    """The accelerations that the loads follow (m/s^2, (T,) each): the measured ones behind the lag of roll and pitch."""
     kept = np.exp(-study.dt / study.load_time)
 
     def step(before, measured):

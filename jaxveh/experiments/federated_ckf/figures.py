@@ -1,4 +1,4 @@
-"""The study's pictures: the parameters over time, one drive with its fault, what steer and speed can tell."""
+"""The study's figures: the parameters over time, one drive with its fault, the information in steer and speed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SHOWN = {
 
 
 def figures(result: Reproduction) -> dict[str, Any]:
-    """All pictures by file stem."""
+    """All figures by file stem."""
     return {
         "parameters": parameters_figure(result.raced),
         "drive": drive_figure(result.raced),
@@ -40,12 +40,12 @@ def figures(result: Reproduction) -> dict[str, Any]:
 
 
 def _those(raced: Raced, colours: dict[str, str]) -> dict[str, str]:
-    """Who of these has raced."""
+    """Those of these estimators that took part, with their colours."""
     return {name: colour for name, colour in colours.items() if name in raced.found.design.axis("estimator").labels}
 
 
 def parameters_figure(raced: Raced, case: str = "printed start") -> Any:
-    """The four parameters over time: medians over seeds and quartiles as bands."""
+    """The four parameters over time: medians over seeds, with quartiles as bands."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 5.0), layout="constrained")
     with style():
         panels = figure.subplots(2, 2, sharex=True)
@@ -107,7 +107,7 @@ FAULTY = {
 
 
 def fault_figure(raced: Raced) -> Any:
-    """The sideslip's error over time with the fault: the median of its size over seeds."""
+    """The sideslip's error over time with the fault: median of its absolute value over seeds."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.4), layout="constrained")
     study, step = raced.study, round(EVERY / raced.study.dt)
     true = np.rad2deg(raced.drives.true_sideslip[raced.cases.index("fault")][:, ::step])
@@ -129,7 +129,8 @@ def fault_figure(raced: Raced) -> Any:
 
 
 def line_figure(result: Reproduction) -> Any:
-    """Bounds of friction and mass over the steer amplitude, by how much the speed varies, and what the joint filter finds."""
+    """Bounds of friction and mass over the steer amplitude, for several variations of the speed, and the joint filter's
+    errors."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.8), layout="constrained")
     bound = lambda who, name, j: 100.0 * np.array([row[j].bounds[name] for row in result.seen[who]])
     with style():
@@ -142,14 +143,14 @@ def line_figure(result: Reproduction) -> Any:
             for axes, name in ((left, "friction"), (right, "mass")):
                 found = 100.0 * np.median(result.over[f"{name}_error"][:, j], axis=-1)
                 axes.plot(result.steers, found, color=colour, linestyle="none", marker="o", markersize=4)
-        left.set(ylabel="mu [%]", title="Friction: no bound where nothing slides")
-        right.set(ylabel="m [%]", title="Mass: what is known of rolling resistance")
+        left.set(ylabel="mu [%]", title="Friction: no bound where no wheel slides")
+        right.set(ylabel="m [%]", title="Mass: rolling resistance known or not")
         for axes in (left, right):
             axes.set(xlabel="steer amplitude [°]", yscale="log")
             axes.margins(x=0.04)
         grey = dict(color="#444444")
         left.plot([], [], **grey, label="bound (right: resistance unknown)")
-        left.plot([], [], **grey, linestyle=":", label="resistance known, as filters take it")
+        left.plot([], [], **grey, linestyle=":", label="resistance known, as in the filters")
         left.plot([], [], **grey, linestyle="none", marker="o", markersize=4, label="joint filter, median error")
         figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure

@@ -1,4 +1,4 @@
-"""What the paper's three estimators tell each other, and how those of parameters see the sensors."""
+"""The results that the paper's three estimators exchange, and the sensor model of those that estimate parameters."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from jaxveh.statespace import LinearInput
 
 
 class Told(NamedTuple):
-    """What the estimators know of each other after a row: its time (s) and inputs, the car with the latest parameters, and the
-    latest state; means alone, as the paper has it."""
+    """The results that the estimators exchange after a row: its time (s) and inputs, the car with the latest parameters, and
+    the latest state; only means, as in the paper."""
 
     t: Any
     u: Any
@@ -24,19 +24,19 @@ class Told(NamedTuple):
 
 
 def propagate(told: Told, car: Planar, t, u) -> State:
-    """Where the car is at `t` with these parameters, from where it was told to be."""
+    """The state of the car at `t` with these parameters, from the state in `told`."""
     path = LinearInput(told.t, jnp.where(t > told.t, t, told.t + 1.0), told.u, u)
     return MOVE(car, told.t, t, told.state, path)
 
 
 def stays(system, t0, t1, x, u):
-    """Parameters stay."""
+    """Parameters that stay as they are."""
     del system, t0, t1, u
     return x
 
 
 class SeenThrough(eqx.Module):
-    """What the sensors say of a car with the estimated parameters, `put(car, x)`, from where it was a row ago."""
+    """The sensors of a car with the estimated parameters, `put(car, x)`, from its state one row before."""
 
     put: Callable = eqx.field(static=True)
 

@@ -1,4 +1,4 @@
-"""What filters believe of the car: the paper's three degrees of freedom, wheel forces from torques, Dugoff across."""
+"""The filters' model of the car: the paper's three degrees of freedom, with F_x from the motor torques and F_y by Dugoff."""
 
 from __future__ import annotations
 
@@ -30,13 +30,14 @@ INPUTS = (*STEERS, "a_x_felt", "a_y_felt", *PULLS)
 CHANNELS = ("a_x", "a_y", "yaw_rate", *WHEELS)
 
 TURNS = 3
-"""How often the slip under a pull is found anew; the pull is small against the grip, so that each turn gains a digit."""
+"""How often the slip under a longitudinal force is computed again; that force is small against the friction limit, so each
+iteration gains one digit."""
 
 LEAST_SHARE = 0.02
-"""The least share of its unbounded force that a sliding wheel is believed to have: slips stay finite for any guess."""
+"""The least share of its unbounded force that the model gives a sliding wheel: slips stay finite for any guess."""
 
 LEAST_SPEED = 1.0
-"""m/s: slips are taken relative to no less, whatever a sigma point says."""
+"""m/s: slips are taken relative to this speed at least, even for slower sigma points."""
 
 
 class State(NamedTuple):
@@ -57,12 +58,13 @@ class Pushed(NamedTuple):
 
 
 class Planar(eqx.Module):
-    """The paper's car: mass, inertia, place of the centre of gravity and friction unknown, all else of `vehicles.sets.ev`.
+    """The paper's car: mass, inertia, position of the centre of gravity and friction are unknown, the rest is
+    `vehicles.sets.ev`.
 
-    A wheel's longitudinal force is known from its motor, `F_x = (T - J_w domega/dt) / r` (eq 10), less rolling resistance; its
-    lateral force is Dugoff's at the slip ratio that gives this F_x, or with `measured_slip` at that of the measured wheel speeds
-    (eq 14; inputs `omega_fl` ...), which shake. Loads follow the measured accelerations (eq 9). `friction` may
-    be one number or one a wheel (`Wheels`), or is told by the inputs `friction_fl` ....
+    A wheel's longitudinal force is known from its motor, `F_x = (T - J_w domega/dt) / r` (eq 10), less rolling resistance.
+    Its lateral force is Dugoff's at the slip ratio that gives this F_x, or with `measured_slip` at the slip ratio of the
+    measured wheel speeds (eq 14; inputs `omega_fl` ...), which is noisy. Loads follow the measured accelerations (eq 9).
+    `friction` may be one number or one per wheel (`Wheels`), or may be given by the inputs `friction_fl` ....
     """
 
     friction: Any = positive("-")
@@ -92,7 +94,8 @@ class Planar(eqx.Module):
         return kit.corners(self.front_axle_to_cg, self.rear_axle_to_cg, self.track_front, self.track_rear)
 
     def push(self, x: State, u: Any) -> Pushed:
-        """What the wheels do to the car in the state x with the inputs u (`steer_fl` ..., `pull_fl` ...; eqs 1-9)."""
+        """The accelerations and the moment that the wheels cause in the state x with the inputs u (`steer_fl` ..., `pull_fl`
+        ...; eqs 1-9)."""
         moves = kit.rolling_wheels(self.places, x.v_x, x.v_y, x.yaw_rate, kit.wheels_of(u, "steer"))
         pulls = kit.wheels_of(u, "pull")
         loads = kit.planar_loads(self, u.a_x_felt, u.a_y_felt, -GRAVITY)
@@ -106,7 +109,7 @@ class Planar(eqx.Module):
         return Pushed((push.F_x - drag) / self.mass, push.F_y / self.mass, push.M_z, omega)
 
     def _frictions(self, u: Any) -> kit.Wheels:
-        """The friction under each wheel: that which is told, where it is an input, else the car's."""
+        """The friction under each wheel: the input, if it is one, otherwise the car's."""
         if hasattr(u, "friction_fl"):
             return kit.wheels_of(u, "friction")
         return self.friction if isinstance(self.friction, kit.Wheels) else kit.Wheels(*[self.friction] * 4)
@@ -119,7 +122,7 @@ class Planar(eqx.Module):
     def _wheels(
         self, moves: kit.Wheels, loads: kit.Wheels, pulls: kit.Wheels, friction: kit.Wheels, slips: kit.Wheels | None
     ) -> kit.Wheels:
-        """Forces and slip ratios of the wheels, all four by one call: a fourth of the program."""
+        """Forces and slip ratios of all four wheels in one call, which makes the program a quarter as long."""
         along = kit.each_wheel(lambda m: m.along, moves)
         across = kit.each_wheel(lambda m: m.across, moves)
         told = pulls if slips is None else slips
@@ -129,7 +132,7 @@ class Planar(eqx.Module):
         return kit.Wheels(*[(Forces(F_x=pull, F_y=F_y[i]), slip_ratio[i]) for i, pull in enumerate(pulls)])
 
     def _lateral_and_slip(self, along, across, load, pull, friction) -> tuple[Any, Any]:
-        """Lateral force (N) and slip ratio of wheels that pull with `pull` (N): Dugoff's law solved for the slip.
+        """Lateral force (N) and slip ratio of wheels with the longitudinal force `pull` (N): Dugoff's law solved for the slip.
 
         With W = |C sigma| the force is W l (2 - l), l = min(1, mu F_z / (2 W)), so that sigma_x = pull / (C_x l (2 - l)).
         """
@@ -148,7 +151,8 @@ class Planar(eqx.Module):
         return share * self.tyre.cornering_stiffness * tangent / rolls, slip_ratio
 
     def _share(self, along, tangent, load, rolls, friction) -> Any:
-        """What sliding leaves of the unbounded force, l (2 - l), where `rolls` is 1 + kappa and sigma = kappa / (1 + kappa)."""
+        """The share of the unbounded force that is left when the wheel slides, l (2 - l); `rolls` is 1 + kappa, sigma =
+        kappa / (1 + kappa)."""
         fading = 0.0 if self.tyre.fading is None else self.tyre.fading
         slides = numerics.hypot(rolls - 1.0, tangent)
         faded = 1.0 - fading * jnp.maximum(jnp.abs(along), LEAST_SPEED) * slides
@@ -178,7 +182,7 @@ def rates(system: Planar, t, x: State, u) -> State:
 
 
 def sensor_outputs(system: Planar, t, x: State, u) -> Any:
-    """What the sensors say."""
+    """The sensors' measurements without noise."""
     del t
     push = system.push(x, u)
     return record_type("Measurements", CHANNELS)(push.a_x, push.a_y, x.yaw_rate, *push.omega)
@@ -201,7 +205,7 @@ def noise_levels(study: Study) -> dict[str, float]:
 
 
 def states_model(study: Study, car: Planar, drive: Drive, inputs: tuple[str, ...] = INPUTS) -> StateSpace:
-    """Three states, the car's parameters known."""
+    """Three states; the car's parameters are known."""
     v_x = jnp.mean(drive.omega[0, 2:]) * car.wheel_radius
     return StateSpace(
         system=car,
@@ -219,7 +223,7 @@ def states_model(study: Study, car: Planar, drive: Drive, inputs: tuple[str, ...
 
 
 def joint_model(study: Study, start: Any, drive: Drive) -> StateSpace:
-    """Seven states: the car's, and the logarithms of four parameters."""
+    """Seven states: three of the car, and the logarithms of four parameters."""
     spreads = (study.friction_spread, study.mass_spread, study.inertia_spread, study.cg_spread)
     where = lambda model: tuple(getattr(model.system, name) for name in PARAMETERS)
     return with_parameters(
@@ -228,7 +232,7 @@ def joint_model(study: Study, start: Any, drive: Drive) -> StateSpace:
 
 
 def rows_of(study: Study, drive: Drive) -> Row:
-    """The drive's rows: pulls from torques and measured wheel speeds (eq 10), measurements by channel."""
+    """The drive's rows: longitudinal forces from torques and measured wheel speeds (eq 10), measurements by channel."""
     car = sets.ev()
     assert car.wheel_inertia is not None and car.wheel_radius is not None
     pulls = (drive.torque - car.wheel_inertia * wheel_rates(study, drive)) / car.wheel_radius

@@ -1,4 +1,4 @@
-"""What a slalom can tell about the parameters at all, whoever estimates them."""
+"""The information about the parameters in a slalom, for any estimator."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Start, Study
 from jaxveh.statespace import LinearInput
 
 START_SPREAD = (0.1, 0.1, 0.05)
-"""What is known of the first state: m/s, m/s, rad/s."""
+"""Standard deviations of the first state: m/s, m/s, rad/s."""
 
 RESISTANCE = {"known": 1e-6, "unknown": 0.3}
-"""What is known of the logarithm of the rolling resistance: filters take it as known."""
+"""Standard deviations of the logarithm of the rolling resistance; filters take it as known."""
 
 
 def sensitivities(study: Study, true: Start, drive: Drive) -> jax.Array:
-    """(R, 8): how every measurement of a drive, over its noise, depends on the logarithms of the four parameters, on the first
-    state and on the logarithm of the rolling resistance, at the truth and without process noise; a pure function, for `vmap`."""
+    """(R, 8): the sensitivity of every measurement of a drive, divided by its noise, to the logarithms of the four
+    parameters, to the first state and to the logarithm of the rolling resistance, at the truth and without process noise; a
+    pure function, for `vmap`."""
     rows, car = rows_of(study, drive), planar(study, true)
     levels = jnp.asarray(list(noise_levels(study).values()))
     logs = jnp.log(jnp.stack([jnp.asarray(getattr(true, name)) for name in PARAMETERS]))
@@ -47,8 +48,8 @@ def sensitivities(study: Study, true: Start, drive: Drive) -> jax.Array:
 def observability_of_drives(study: Study, true: Start, drives: Drive) -> dict[str, list[list[Observability]]]:
     """The observability in each of the drives, (n, m, T), with the rolling resistance `known` and `unknown`: lists (n, m).
 
-    Sensitivities are those at the truth. Where wheels barely slide, a filter that believes in more friction sees none slide,
-    and has no sensitivity at all: it stays where it is, whatever the bound says.
+    Sensitivities are those at the truth. If wheels barely slide, a filter whose estimate of the friction is larger has no
+    sliding wheel and no sensitivity at all: its estimate does not move, whatever the bound.
     """
     shape = drives.a_x.shape[:2]
     flat = jax.tree.map(lambda leaf: jnp.asarray(leaf.reshape(-1, *leaf.shape[2:])), drives)

@@ -20,12 +20,12 @@ from jaxveh.statespace import Discrete, Gaussian, Prior, Row, StateSpace
 from jaxveh.vehicles import kit
 
 FIRST, SECOND = ("a_x_1", "a_y_1", "yaw_rate_1"), ("a_y_2", "yaw_rate_2")
-"""Z_1 and Z_2: the same sensors under two names, since the two locals are told different noise."""
+"""Z_1 and Z_2: the same sensors under two names, because the two local filters have different noises."""
 
 ALL_INPUTS = (*INPUTS, *WHEELS)
 
 EXACT = 1e-8
-"""What stands for the printed variances of zero."""
+"""Replaces the printed variances of zero."""
 
 STATE = ("v_x", "v_y", "a_x", "a_y", "yaw_rate", "moment")
 BODY = ("mass", "yaw_inertia", "front_axle_to_cg")
@@ -41,15 +41,15 @@ BODY_R = {**dict.fromkeys(FIRST, 1000.0), **dict.fromkeys(SECOND, 10.0)}
 STATE_P, STATE_Q = 0.5, 0.5
 FRICTION_P, FRICTION_Q = 1.0, 0.5
 BODY_P, BODY_Q = 1.0 / (1.0 / 100.0 + 1.0 / 10.0), 1.0 / (1.0 / 0.001 + 1.0 / 0.1)
-"""Variances of the master, a step: the printed ones belong to the two locals, whose informations add up."""
+"""Variances of the master per step: the printed ones belong to the two local filters, whose information adds up."""
 
 LEAST_FRICTION, LEAST_MASS = 1e-3, 1.0
-"""What the model takes where a point has less, even none."""
+"""Least values in the model, where a point has less, even zero or a negative number."""
 
 
 def as_printed(study: Study, start: Any, drive: Drive) -> Found:
-    """The paper's estimators: fusion-reset, shares by traces (1/2 at first: printed are zeros, which divide by zero), singular
-    values, additive parameters, four frictions."""
+    """The paper's estimators: fusion-reset, shares by traces (1/2 at first: the printed zeros would divide by zero),
+    singular values, additive parameters, four frictions."""
     car = eqx.tree_at(lambda c: c.friction, planar(study, start, measured_slip=True), kit.Wheels(*[start.friction] * 4))
     rows = _printed_rows(study, drive)
     filter_ = filters.Federated(filters.Cubature(form=filters.SingularValues()), (FIRST, SECOND), by_trace=True)
@@ -61,7 +61,7 @@ def as_printed(study: Study, start: Any, drive: Drive) -> Found:
     (x, P), (mu, P_mu), (body, P_body) = (kept[name] for name in turns)
     mu_mean = jnp.mean(mu, axis=1, keepdims=True)
     parameters = jnp.concatenate([mu_mean, body], axis=1)
-    # Relative errors stand for logarithms.
+    # Relative errors take the place of logarithms.
     vector = jnp.concatenate([x[:, jnp.array([0, 1, 4])], jnp.log(jnp.maximum(parameters, 1e-3))], axis=1)
     scale = jnp.maximum(parameters, 1e-3)
     covariance = jnp.zeros((x.shape[0], 7, 7)).at[:, :3, :3].set(P[:, jnp.array([0, 1, 4])][:, :, jnp.array([0, 1, 4])])
@@ -125,7 +125,7 @@ def _three_of_six(car, t, x, u) -> Any:
 
 
 def _through(put):
-    """What a car with the estimated parameters does from where it was told to be."""
+    """The measurements of a car with the estimated parameters, from the state in `told`."""
 
     def observe(told: Told, t, x, u):
         car = put(told.car, x)

@@ -1,4 +1,4 @@
-"""What the paper's printed settings do, and what its errata cost."""
+"""The results of the paper's printed settings, and the cost of its errata."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from jaxveh.statespace import Gaussian, kit
 from jaxveh.sweeps import IN_MEMORY, Stores, Table
 
 SHOWN = ("first guess", "three federated, shared sensors", "joint")
-"""What stands beside the printed settings."""
+"""The estimators beside the printed settings."""
 
 
 def as_printed(
@@ -35,8 +35,8 @@ def as_printed(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> list[Table]:
-    """The paper's test (constant speed, printed start) with its printed numbers and with ours, and what counting sensors twice
-    does to the covariance."""
+    """The paper's test (constant speed, printed start) with its printed numbers and with ours, and the effect on the
+    covariance when sensors are counted twice."""
     study, stores = study or Study(), stores.under("as-printed")
     key = jax.random.fold_in(jax.random.key(seed), 3)
     told = part(progress, 0.0, 0.1, "drives")
@@ -52,7 +52,7 @@ def _runs(study: Study) -> dict[str, tuple[Any, str]]:
     every = contestants(study)
     own = {name: (every[name].run, every[name].what) for name in SHOWN}
     first = {"first guess": own.pop("first guess")}
-    what = "printed P, Q, R and start; shares 1/2 at first (printed: 0), 0 of R as 1e-8, R of the parameters for three channels"
+    what = "printed P, Q, R and start; shares 1/2 at first (printed: 0), zeros in R as 1e-8, R of parameters for three channels"
     shares = with_shares()
     return {**first, "as printed": (printed_filters, what), **own, "federated, disjoint sensors": shares[:2]}
 
@@ -99,11 +99,12 @@ def _table(found: sweeps.Swept, seeds: int) -> Table:
 
 
 Z_1, Z_2 = ("a_x", "a_y", "yaw_rate"), ("a_y", "yaw_rate")
-"""What the paper's two locals measure."""
+"""The measurements of the paper's two local filters."""
 
 
 def _twice(study: Study, drives: Drive, progress: Progress, stores: Stores) -> sweeps.Swept:
-    """Final traces of the states' covariance over the prior's variances, the paper's sensors alone, all parameters known."""
+    """Final traces of the states' covariance, divided by the prior's variances, with the paper's sensors only and all
+    parameters known."""
     cubature, right = filters.Cubature(), truth(study)
     chosen = {
         "centralised": cubature,
@@ -134,7 +135,7 @@ def _traces(found: sweeps.Swept, seeds: int) -> Table:
     names = found.design.axis("filter").labels
     rows = [(name, spread(found.at("trace", filter=name) / centralised)) for name in names]
     return Table(
-        f"Three states, parameters known: trace of the believed P over that of the centralised filter; {seeds} seeds",
+        f"Three states, parameters known: trace of the filter's P over that of the centralised filter; {seeds} seeds",
         ("filter", "ratio"),
         rows,
     )

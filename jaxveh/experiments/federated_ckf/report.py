@@ -1,4 +1,4 @@
-"""The report: tables, checks against honest criteria, and what the printed settings do."""
+"""The report: tables, checks against honest criteria, and the results of the printed settings."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ from jaxveh.experiments.report import Check, above, at_most, interval, spread, w
 from jaxveh.sweeps import IN_MEMORY, Stores, Swept, Table, compare
 
 STEERS, SPREADS = (3.0, 4.0, 5.0, 8.0), (0.0, 0.1, 0.3)
-"""Steer amplitudes (degrees) and spreads of the speed (m/s) whose drives are looked at for what they can tell."""
+"""Steer amplitudes (degrees) and standard deviations of the speed (m/s) of the drives whose information is computed."""
 
 NEES = (0.25, 4.0)
-"""Within which a believed covariance agrees with the errors."""
+"""Bounds within which a filter's covariance agrees with its errors."""
 
 LIMITS = {"friction": 1.0, "mass": 2.0, "yaw_inertia": 5.0, "front_axle_to_cg": 2.0}
-"""Final errors, %."""
+"""Limits of the final errors, %."""
 
 
 class Reproduction(NamedTuple):
-    """Everything the experiment found: `raced`, all estimators in all cases; over `steers` (degrees) and `spreads` (m/s) the
-    joint filter's errors `over`, and what the first seed's drive can tell, `seen`, by what is known of the rolling resistance;
-    `roads`: one friction and four where the road has several, and rear wheels that turn."""
+    """All results of the experiment: `raced`, all estimators in all cases; over `steers` (degrees) and `spreads` (m/s) the
+    joint filter's errors, `over`, and the observability in the first seed's drive, `seen`, with the rolling resistance known
+    and unknown; `roads`: one friction and four on roads with several frictions, and rear wheels that turn."""
 
     seeds: int
     raced: Raced
@@ -73,7 +73,7 @@ def run(
     speeds = tuple(sorted({*SPREADS, study.speed_std}))
     grid = drives_of(study, steers, speeds, seeds, key, progress=part(progress, 0.0, 0.08, "drives"), stores=stores)
     names = tuple(cases(study))
-    # The paper's slalom is one of the grid's.
+    # The paper's slalom is one of the grid's drives.
     own = steers.index(study.steer), speeds.index(study.speed_std)
     known = Drive(*(leaf[own] for leaf in grid))
     told = part(progress, 0.08, 0.15, "other tyres")
@@ -124,7 +124,7 @@ def check(result: Reproduction) -> list[Check]:
     found.append(at_most(ISOLATION, faulty, 0.6))
     gated = [median("sideslip_rmse", "joint, gated", case) for case in ("fault", "nearer start")]
     found.append(at_most(GATE, gated[0] / gated[1], 1.2))
-    # Of mu, over the prior's spread: without end where nothing slides.
+    # The bound of mu over the prior's standard deviation; infinite if no wheel slides.
     smallest = min(float(one.bounds.friction / one.spread.friction) for one in result.seen["known"][0])
     found.append(above(SMALL_STEER, smallest, 1.0))
     return with_terms(found, CRITERIA)
@@ -136,7 +136,7 @@ def _nees(who: str, case: str, value: float) -> list[Check]:
 
 
 def tables(result: Reproduction) -> list[Table]:
-    """The tables, the do-nothing first guess in each of the estimators'."""
+    """The tables; those of the estimators include the first guess, which does nothing."""
     raced = result.raced
     found = [race_table(raced, case) for case in (*STARTS, OTHER)]
     speeds = speed_table(raced, (*STARTS, OTHER))
@@ -146,7 +146,7 @@ def tables(result: Reproduction) -> list[Table]:
 TITLES = {
     "printed start": "From the printed start mu 1, 700 kg, 1400 kg m^2, 1.0 m",
     "nearer start": "From mu 0.3, 1050 kg, 1500 kg m^2, 1.1 m",
-    "other tyres": "The same on tyres with a peak (Magic Formula), which no filter knows",
+    "other tyres": "The same on tyres with a peak (Magic Formula), which no filter has",
 }
 
 
@@ -213,7 +213,7 @@ def _line_table(result: Reproduction) -> Table:
                  100.0 * unknown.bounds.mass, spread(m, scale=100.0))
             )  # fmt: skip
     return Table(
-        "What steer and speed can tell: Cramer-Rao bounds in % (at the truth), and the joint filter's final errors in %",
+        "Information in steer and speed: Cramer-Rao bounds in % (at the truth), and the joint filter's final errors in %",
         (
             "steer, degrees",
             "speed varied by, m/s",

@@ -1,4 +1,4 @@
-"""Drives on roads whose friction is not one number, and with rear wheels that turn, too."""
+"""Drives on roads with several frictions, also with rear wheels that turn."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from jaxveh.vehicles import Motion, sets
 class LaneSlalom(AbstractDriver):
     """A slalom about the middle of the road (the world's x axis), so that left and right wheels keep to their sides.
 
-    To a sine of `steer` (rad) and `frequency` (Hz), the first second faded in, come `-per_offset y - per_yaw yaw` (rad/m, -) of
-    the car's place and heading. The rear wheels turn by `rear` (-) times as much as the front ones.
+    The steer is a sine of `steer` (rad) and `frequency` (Hz), faded in over the first second, plus `-per_offset y - per_yaw
+    yaw` (rad/m, -) of the car's position and heading. The rear wheels turn by `rear` (-) times as much as the front ones.
     """
 
     speed: AbstractSpeed
@@ -60,11 +60,11 @@ class LaneSlalom(AbstractDriver):
 
 
 LANE_RATE, LANE_DAMPING = 0.5, 0.7
-"""How fast the driver comes back to the middle (rad/s), slowly beside the slalom, and the damping ratio."""
+"""How fast the driver returns to the middle (rad/s), slowly compared with the slalom, and the damping ratio."""
 
 
 def lane_slalom(study: Study, speed: AbstractSpeed, rear: Any) -> LaneSlalom:
-    """The driver whose offset y follows y'' + 2 D w y' + w^2 y = 0 beside his slalom: yaw' = v steer / L and y' = v yaw."""
+    """The driver whose offset y obeys y'' + 2 D w y' + w^2 y = 0 beside the slalom: yaw' = v steer / L and y' = v yaw."""
     turning = study.speed / sets.ev().wheelbase
     return LaneSlalom(
         speed=speed,
@@ -78,7 +78,7 @@ def lane_slalom(study: Study, speed: AbstractSpeed, rear: Any) -> LaneSlalom:
 
 
 class Patches(roads.AbstractRoad):
-    """A level road with the frictions `left` and `right` of its middle up to `at_distance` (m), and `beyond` from there on."""
+    """A level road with the frictions `left` and `right` of its middle up to `at_distance` (m), and `beyond` after it."""
 
     left: jax.Array = positive("-")
     right: jax.Array = positive("-")
@@ -92,12 +92,12 @@ class Patches(roads.AbstractRoad):
 
 
 NEVER = 1e6
-"""m: further than anybody drives."""
+"""m: farther than any drive."""
 
 
 class RoadCase(NamedTuple):
-    """Frictions on the left and on the right, beyond a distance (m), and the rear wheels' angle over the front ones'; whether
-    filters are told the rear wheels' angles; all in words."""
+    """Frictions on the `left`, on the `right` and `beyond` a distance (m), and the angle of the `rear` wheels over that of
+    the front ones; whether filters are told the rear wheels' angles; and a description, `what`."""
 
     left: float
     right: float
@@ -109,7 +109,7 @@ class RoadCase(NamedTuple):
 
 
 def road_cases(study: Study) -> dict[str, RoadCase]:
-    """What every estimator goes through."""
+    """The roads for every estimator."""
     low, high, jump, rear = study.friction, study.other_friction, study.jump_at, study.rear_steer
     turned = f"mu {low:g}, rear wheels turn by {rear:g} of the front ones"
     return {
@@ -117,12 +117,12 @@ def road_cases(study: Study) -> dict[str, RoadCase]:
         "split mu": RoadCase(low, high, high, NEVER, 0.0, True, f"mu {low:g} on the left, {high:g} on the right"),
         "mu jump": RoadCase(high, high, low, jump, 0.0, True, f"mu {high:g}, and {low:g} from {jump:g} m on"),
         "rear steer": RoadCase(low, low, low, NEVER, rear, True, turned),
-        "rear steer, untold": RoadCase(low, low, low, NEVER, rear, False, f"{turned}; filters believe them straight"),
+        "rear steer, untold": RoadCase(low, low, low, NEVER, rear, False, f"{turned}; filters take them as straight"),
     }
 
 
 def drives_on_roads(study: Study, seeds: int, key, *, progress: Progress = silent, stores: Stores = IN_MEMORY) -> Drive:
-    """Drives of each case, one a seed: (cases, seeds, T, ...)."""
+    """Drives of each case, one per seed: (cases, seeds, T, ...)."""
     check_whole("seeds", seeds, 2)
     cases = road_cases(study).values()
     numbers = np.array([case[:5] for case in cases])

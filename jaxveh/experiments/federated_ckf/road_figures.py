@@ -1,4 +1,4 @@
-"""Pictures of the speeds, and of friction under each wheel on roads whose friction is not one number."""
+"""Figures of the speeds, and of the friction under each wheel on roads with several frictions."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ MUS = {
     "four mu": kit.CYCLE[3],
     "four mu, walking": kit.CYCLE[1],
 }
-"""Who is shown on the roads, in which colour."""
+"""The estimators in the figures of the roads, with their colours."""
 
 TICKS = (0.1, 0.2, 0.5, 1.0, 2.0)
 WHEELS = ("front left", "front right", "rear left", "rear right")
 
 
 def speeds_figure(raced: Raced, shown: dict[str, str], case: str = "printed start", seed: int = 0) -> Any:
-    """Both speeds of one drive as each of the `shown` estimators (and its colour) finds them, and their errors."""
+    """Both speeds of one drive as estimated by each of the `shown` estimators (with its colour), and their errors."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 5.6), layout="constrained")
     place, step = raced.cases.index(case), round(EVERY / raced.study.dt)
     drive = type(raced.drives)(*(leaf[place, seed][::step] for leaf in raced.drives))

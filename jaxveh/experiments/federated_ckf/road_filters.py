@@ -1,4 +1,4 @@
-"""One friction or four: the estimators on roads whose friction is not one number, and what each of them knows."""
+"""One friction or four: the estimators on roads with several frictions, and what each of them is told."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from jaxveh.vehicles import kit as vehicles_kit
 from jaxveh.vehicles import sets
 
 ROAD_START = dataclasses.replace(OTHER_START, friction=0.5)
-"""The nearer start, but no friction of these roads."""
+"""The nearer start, but with a friction that none of these roads has."""
 
 
 class RoadFound(NamedTuple):
-    """Estimates over time, (T,): speeds (m/s), `mass` (kg); (T, 4) `friction` under each wheel, and the variance of its logarithm
-    that is believed, zero where it is taken for certain."""
+    """Estimates over time, (T,): speeds (m/s), `mass` (kg); (T, 4) `friction` under each wheel, and the filter's `variance`
+    of its logarithm, zero if it takes it as certain."""
 
     v_x: Any
     v_y: Any
@@ -38,19 +38,19 @@ class RoadFound(NamedTuple):
 
 
 class RoadContestant(NamedTuple):
-    """`run(study, drive) -> RoadFound` from `ROAD_START`, and what it knows, in words."""
+    """`run(study, drive) -> RoadFound` from `ROAD_START`, and a description of what it is told, `what`."""
 
     run: Callable[[Study, Drive], RoadFound]
     what: str
 
 
 def road_contestants(study: Study) -> dict[str, RoadContestant]:
-    """All of them by name, the do-nothing one first."""
+    """All estimators by name, beginning with the one that does nothing."""
     walk, slow = study.friction_walk, study.walk
     pace = lambda one: f"walks by {100 * one:g} % in a second"
     one, four = "one friction for all wheels", "a friction for each wheel"
     return {
-        "first guess": RoadContestant(_guess, "the parameters are the first guess; states by a cubature filter"),
+        "first guess": RoadContestant(_guess, "parameters stay at the first guess; states by a cubature filter"),
         "one mu": RoadContestant(_joint(False, slow), f"the joint filter: {one}, which {pace(slow)}"),
         "one mu, walking": RoadContestant(
             _joint(False, walk), f"{one}, which {pace(walk)}: it is told that friction changes"
@@ -58,7 +58,7 @@ def road_contestants(study: Study) -> dict[str, RoadContestant]:
         "four mu": RoadContestant(_joint(True, slow), f"{four}, which {pace(slow)}: it is told that wheels may differ"),
         "four mu, walking": RoadContestant(_joint(True, walk), f"{four}, which {pace(walk)}: it is told both"),
         "told the friction": RoadContestant(
-            _told, "knows the true friction under each wheel, as no car does: what is left"
+            _told, "is told the true friction under each wheel, as in no real car: the remaining error"
         ),
     }
 
@@ -119,9 +119,9 @@ def _told(study, drive):
 
 
 def road_metrics(study: Study, found: RoadFound, drive: Drive) -> dict[str, Any]:
-    """Errors of a run from `settled` on: RMSE of `v_x`, `v_y` (m/s) and `sideslip` (degrees), root mean squares of the
-    error of the friction's logarithm, under all wheels (`friction_error`) and those on each side; its squares over the variance
-    that is believed (`friction_nees`); the share by which the `mass` is off at the end. Estimates ten a second.
+    """Errors of a run from `settled` on: RMSE of `v_x`, `v_y` (m/s) and `sideslip` (degrees), root mean square errors of the
+    friction's logarithm under all wheels (`friction_error`) and on each side; its squared error over the filter's variance
+    (`friction_nees`); the relative error of the `mass` at the end. Ten estimates per second.
     """
     later = times(study) >= study.settled
     count = jnp.sum(jnp.where(later, 1.0, 0.0))
@@ -153,8 +153,8 @@ def _true_mass() -> float:
 
 
 class RacedOnRoads(NamedTuple):
-    """`drives` by case, (cases, seeds, T, ...), and what the estimators made of them: `found` with the axes estimator, case (by
-    number) and seed."""
+    """`drives` by case, (cases, seeds, T, ...), and the results of the estimators, `found`, with the axes estimator, case
+    (by number) and seed."""
 
     study: Study
     cases: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Tables of the speeds, and of one friction beside four on roads whose friction is not one number."""
+"""Tables of the speeds, and of one friction and four on roads with several frictions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ def speed_table(raced: Raced, cases: tuple[str, ...]) -> Table:
 
 
 def road_tables(raced: RacedOnRoads) -> list[Table]:
-    """A table a road: errors of speeds, friction on both sides and mass, and whether the friction's spread is believable."""
+    """One table per road: errors of speeds, friction on both sides and mass, and the consistency of the friction's
+    variance."""
     whats, begun = road_contestants(raced.study), f"from mu {ROAD_START.friction:g}"
     found = []
     for case, about in road_cases(raced.study).items():
@@ -43,7 +44,7 @@ def road_tables(raced: RacedOnRoads) -> list[Table]:
                 f"{case.capitalize()} ({about.what}), {begun}: median [quartiles] over {raced.found.seeds} seeds",
                 (
                     "estimator", "v_x RMSE, m/s", "v_y RMSE, m/s", "sideslip RMSE, degrees", "ln mu left, %", "ln mu right, %",
-                    "NEES of mu", "m, %", "what it knows",
+                    "NEES of mu", "m, %", "what it is told",
                 ),
                 rows,
             )

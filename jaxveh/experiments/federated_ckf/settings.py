@@ -1,4 +1,4 @@
-"""What the paper prints, and what the study assumes where it is silent."""
+"""The printed settings of the paper, and the assumptions of the study where the paper gives none."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SPEED, FRICTION, STEP = 20.0 / 3.6, 0.2, 0.02
 """The paper's test: m/s, friction of the road (-), s between rows."""
 
 PARAMETERS = ("friction", "mass", "yaw_inertia", "front_axle_to_cg")
-"""What is estimated of the car and the road: mu (-), m (kg), I_z (kg m^2), a (m)."""
+"""The estimated parameters of the car and the road: mu (-), m (kg), I_z (kg m^2), a (m)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,7 +32,7 @@ PRINTED_START = Start(1.0, 700.0, 1400.0, 1.0)
 """As printed."""
 
 OTHER_START = Start(0.3, 1050.0, 1500.0, 1.1)
-"""Ours: on the other side of a, and nearer in all else."""
+"""Our own: a is off to the other side, all others are nearer to the truth."""
 
 STARTS = {"printed": PRINTED_START, "nearer": OTHER_START}
 
@@ -41,28 +41,31 @@ STARTS = {"printed": PRINTED_START, "nearer": OTHER_START}
 class Study:
     """A slalom on a slippery road and its sensors. Truth: a four-motor car of seven degrees of freedom (`vehicles.sets.ev`).
 
-    `duration` s, rows every `dt` s, `max_step` s of the simulation: wheels spin with 860 1/s at 20 km/h, and explicit steps above
-    3 ms would ring. `speed` m/s, varied with the standard deviation `speed_std` over `speed_time` s, no faster than one swing in
-    `speed_fastest` s. Steer: a sine of amplitude `steer` (rad at the road wheels) and `steer_frequency` (Hz), the first second
-    faded in. `friction`: the road's; `fading` (s/m): the paper's speed influence eps.
+    `duration` s, rows every `dt` s, `max_step` s of the simulation: the wheel spins have a pole of 860 1/s at 20 km/h, and
+    explicit steps above 3 ms would ring. `speed` m/s, varied with the standard deviation `speed_std` over `speed_time` s, no
+    faster than one swing in `speed_fastest` s. Steer: a sine of amplitude `steer` (rad at the road wheels) and
+    `steer_frequency` (Hz), faded in over the first second. `friction`: that of the road; `fading` (s/m): the paper's speed
+    influence eps.
 
-    Sensors: white noise of `a_x`, `a_y` (m/s^2), `yaw_rate` (rad/s), the size of production units (`sensors.production_car`),
-    `wheel_speed` (rad/s; 6 mm/s at the tread). Steer and motor torques are known. Wheels' accelerations (for eq 10) are
-    differences over `rate_time` s; loads follow the measured accelerations with the lag of roll and pitch, `load_time` s.
+    Sensors: white noise of `a_x`, `a_y` (m/s^2) and `yaw_rate` (rad/s), as large as in production units
+    (`sensors.production_car`), and `wheel_speed` (rad/s; 6 mm/s at the tread). Steer and motor torques are known. The
+    wheels' accelerations (for eq 10) are differences over `rate_time` s; loads follow the measured accelerations with the
+    lag of roll and pitch, `load_time` s.
 
     Fault: the yaw rate is off by `bias` (rad/s) from `fault_at` (s) for `fault_time` (s). Errors count from `settled` (s) on.
 
-    Other roads: `other_friction`, on the right side or before `jump_at` (m), where it becomes `friction`; the slalom in a lane
-    has `lane_frequency` (Hz), so fast that the wheels keep to their sides; `rear_steer`: the rear wheels' angle over the front
-    ones', where they turn; `friction_walk` (relative, per sqrt(s)): of filters that are told that the friction changes.
+    Other roads: `other_friction`, on the right side or before `jump_at` (m), where it becomes `friction`; the slalom in a
+    lane has `lane_frequency` (Hz), high enough for the wheels to keep to their sides; `rear_steer`: the rear wheels' angle
+    over that of the front ones, where they turn; `friction_walk` (relative, per sqrt(s)): of filters that are told that the
+    friction changes.
 
-    Filters: spreads of the prior's logarithms, `friction_spread` to `cg_spread`: two of them reach from a dry road to an icy one,
-    from an empty car to twice its load, and over a fifth of the place of the centre of gravity. (With a friction's of 1.0 the
-    joint filter loses one drive in 40 before the first turn: points then lie a factor of 14 apart.) `speed_noise`
-    (m/s per sqrt(s)), `yaw_noise` (rad/s per sqrt(s)) and `walk` (relative, per sqrt(s); of every parameter): those of the
-    greatest likelihood on drives of other keys, so that the truth has no part in them, within a factor of three. `isolate`:
-    how often its expected value the fading mean of a sensor group's NIS may be; `gate`: how many standard deviations an
-    innovation.
+    Filters: standard deviations of the prior's logarithms, `friction_spread` to `cg_spread`: two of them reach from a dry
+    road to an icy one, from an empty car to twice its load, and over a fifth of the position of the centre of gravity. (With
+    1.0 for the friction the joint filter loses one drive in 40 before the first turn: points then lie a factor of 14 apart.)
+    `speed_noise` (m/s per sqrt(s)), `yaw_noise` (rad/s per sqrt(s)) and `walk` (relative, per sqrt(s); of every parameter):
+    those of the greatest likelihood on drives of other keys, within a factor of three, so that the truth is not used.
+    `isolate`: largest ratio of the fading mean of a sensor group's NIS to its expected value; `gate`: largest innovation in
+    standard deviations.
     """
 
     duration: float = 30.0

@@ -1,4 +1,4 @@
-"""The runs: drives once, then every estimator on the same drives."""
+"""The runs: each drive once, then every estimator on the same drives."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from jaxveh.vehicles import sets
 
 
 class Case(NamedTuple):
-    """A drive and a first guess: with a `bias` (rad/s) of the yaw rate for a while, on a Magic Formula's tyres; and what filters
-    take for the process noise (`speed_noise`, `yaw_noise`, `walk`; None: the study's)."""
+    """A drive and a first guess (`start`), with a `bias` (rad/s) of the yaw rate for a while, or on the tyres of a
+    `magic_formula`; and the filters' process `noise` (`speed_noise`, `yaw_noise`, `walk`; None: the study's)."""
 
     start: Start
     bias: float = 0.0
@@ -30,7 +30,7 @@ class Case(NamedTuple):
 
 
 def cases(study: Study) -> dict[str, Case]:
-    """What every estimator goes through."""
+    """The cases for every estimator."""
     return {
         "printed start": Case(PRINTED_START),
         "nearer start": Case(OTHER_START),
@@ -44,7 +44,7 @@ OTHER_NOISE = (0.01, 0.01, 1e-3)
 
 
 class Raced(NamedTuple):
-    """One study: `drives` by case, (cases, seeds, T, ...), and what the estimators made of them, `found` with the axes
+    """One study: `drives` by case, (cases, seeds, T, ...), and the results of the estimators, `found`, with the axes
     estimator, case (by number) and seed."""
 
     study: Study
@@ -74,10 +74,11 @@ def drives_of(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> Drive:
-    """Drives with each steer amplitude (rad) and spread of the speed (m/s), one a seed: (steers, spreads, seeds, T, ...)."""
+    """Drives with each steer amplitude (rad) and standard deviation of the speed (m/s), one per seed: (steers, spreads,
+    seeds, T, ...)."""
     check_whole("seeds", seeds, 2)
     run = lambda point, key: drive_once(study, point.amplitude, point.speed_std, key, magic_formula=magic_formula)
-    # A drive has a steer of its own.
+    # The design's axis cannot be called steer, as a drive has a `steer` of its own.
     design = sweeps.Design(amplitude=steer, speed_std=speed_std)
     found = stores.sweep("drives", run, design, seeds, key, progress=progress)
     return Drive(**{name: found[name] for name in Drive._fields})
@@ -93,8 +94,8 @@ def drives_by_case(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> Drive:
-    """The drives of the cases, (cases, seeds, T, ...): the same seeds for all, and the fault on top. `known`, (seeds, T, ...):
-    those on Dugoff's tyres of the same key, where they are made already."""
+    """The drives of the cases, (cases, seeds, T, ...): the same seeds for all, with the fault added. `known`, (seeds, T,
+    ...): drives on Dugoff's tyres with the same key, if they are already there."""
     wanted, made = cases(study), {} if known is None else {False: known}
     for magic in {wanted[name].magic_formula for name in names} - set(made):
         found = drives_of(
@@ -154,7 +155,8 @@ def race_over(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> sweeps.Swept:
-    """One estimator from the nearer start on drives (steers, spreads, seeds, T, ...): a sweep with the axes steer, speed_std."""
+    """One estimator from the nearer start on drives (steers, spreads, seeds, T, ...): a sweep with the axes steer,
+    speed_std."""
     contestant, right = contestants(study)[estimator], truth(study)
 
     def run(point, drive):

@@ -1,4 +1,4 @@
-"""Every model, method and figure of paper 002 (Ji, Li, Fan), and who has it here."""
+"""Every model, method and figure of paper 002 (Ji, Li, Fan), and its place in this package."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ SYSTEMS = (
         "single extended filter, Sage-Husa, interacting models, dual and triple filters",
         "introduction [4-9]",
         ("filters.Extended", "filters.SageHusa", "filters.InteractingModels", "filters.Dual"),
-        "not raced on the paper's drive, which has nothing that they are for",
+        "not compared on the paper's drive, which has none of the situations that they are for",
     ),
     System("states and parameters over time", "figs 3, 4", ("experiments.federated_ckf.figures",)),
     System("the printed filters", "4", ("experiments.federated_ckf.printed.as_printed",)),
-    System("a sensor that lies", "4", ("experiments.federated_ckf.drives",)),
+    System("a sensor with a fault", "4", ("experiments.federated_ckf.drives",)),
 )

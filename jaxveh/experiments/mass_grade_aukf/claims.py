@@ -1,4 +1,5 @@
-"""What the paper says beside its numbers: how gentle its drives are, who is better than whom, and who needs acceleration."""
+"""The paper's claims besides its numbers: how gentle its drives are, which estimator is better, and which needs
+acceleration."""
 
 from __future__ import annotations
 
@@ -25,27 +26,32 @@ class Claim(NamedTuple):
 
 
 CLAIMS = (
-    Claim("the AUKF ends nearer to the mass than the UKF", "mass_error", "AUKF", "UKF"),
-    Claim("the AUKF is nearer over the whole drive: it converges faster", "mass_rmse", "AUKF", "UKF"),
+    Claim("the final mass of the AUKF is nearer to the truth than that of the UKF", "mass_error", "AUKF", "UKF"),
+    Claim("the mass of the AUKF is nearer over the whole drive: it converges faster", "mass_rmse", "AUKF", "UKF"),
     Claim("the AUKF finds the grade better than the UKF", "grade_rmse", "AUKF", "UKF"),
-    Claim("the same of a UKF that is sure of a wrong first guess", "mass_error", "AUKF", "UKF, timid"),
-    Claim("who stops below 0.6 m/s^2 [8] is worse off here", "mass_error", "AUKF", "gated"),
-    Claim("high-pass filtered least squares [11] are worse off here", "mass_error", "AUKF", "high-pass"),
-    Claim("an accelerometer that takes the grade away [12, 13] is better", "mass_error", "kinematic grade", "AUKF"),
-    Claim("the grade of accelerometer and speed alone [12] is better", "grade_rmse", "kinematic grade", "AUKF"),
+    Claim(
+        "the same against a UKF with a wrong first guess and a small standard deviation",
+        "mass_error",
+        "AUKF",
+        "UKF, timid",
+    ),
+    Claim("an estimator that stops below 0.6 m/s^2 [8] is worse here", "mass_error", "AUKF", "gated"),
+    Claim("high-pass filtered least squares [11] are worse here", "mass_error", "AUKF", "high-pass"),
+    Claim("an accelerometer that removes the grade [12, 13] is better", "mass_error", "kinematic grade", "AUKF"),
+    Claim("the grade from accelerometer and speed alone [12] is better", "grade_rmse", "kinematic grade", "AUKF"),
 )
-"""Those that compare two."""
+"""The claims that compare two estimators."""
 
 WITHIN = {
     "settled": (10.0, 1.0, "within 3 % from then on, s, from each first guess"),
     "mass_error": (3.0, 100.0, "final error of the mass, %, from each first guess"),
 }
-"""Those of the AUKF alone: its bound, the scale of the metric, and what it is."""
+"""The claims about the AUKF alone: its bound, the scale of the metric, and a description."""
 
 
 def claims_table(*raced: Raced) -> Table:
-    """Every claim in each of the races: ratios with 95 % intervals, paired over seeds, means over first guesses; what the AUKF
-    alone should reach, of its worst first guess. Beside it: the same of doing nothing."""
+    """Every claim in each of the races: ratios with 95 % intervals, paired over seeds, of means over first guesses; for the
+    claims about the AUKF alone the numbers of its worst first guess. Beside them the same numbers of doing nothing."""
     rows = []
     for one in raced:
         at = lambda metric, name, one=one: one.found.at(metric, estimator=name, pedals=one.pedals[-1])
@@ -61,7 +67,7 @@ def claims_table(*raced: Raced) -> Table:
             cells = (interval(found.ratio), f"{BETTER:g}", interval(compare(a, nothing).ratio))
             rows.append((one.study.name, claim.text, *cells, judge_ratio(found.ratio)))
     return Table(
-        "What the paper says, as numbers: ratio of errors [95 % interval] paired over seeds, or median [quartiles]",
+        "The paper's claims as numbers: ratio of errors [95 % interval] paired over seeds, or median [quartiles]",
         ("drives", "claim", "found", "at most", "over (or of) the first guess", "status"),
         rows,
         2,
@@ -80,11 +86,11 @@ PRINTED = {
               "mean |dv/dt|, m/s^2": "< 0.1", "grade peak to peak, degrees": "5.5", "distance, m": "10000"},
     "car": {"highest speed, km/h": "20", "largest |dv/dt|, m/s^2": "< 0.75", "mean |dv/dt|, m/s^2": "< 0.1"},
 }  # fmt: skip
-"""What the paper prints of its drives."""
+"""The numbers that the paper prints of its drives."""
 
 
 def drives_table(*raced: Raced) -> Table:
-    """How gentle the drives are beside the paper's: median and quartiles over seeds."""
+    """How gentle the drives are, beside the paper's: median and quartiles over seeds."""
     found = [(one.study.name, _numbers_of(one)) for one in raced]
     rows = []
     for name in found[0][1]:
@@ -95,7 +101,8 @@ def drives_table(*raced: Raced) -> Table:
 
 
 def _numbers_of(raced: Raced) -> dict[str, np.ndarray]:
-    """(seeds,) each. The slope's pull counts for who is gated by an accelerometer, not for who is by the speed's rate."""
+    """(seeds,) each. The slope's part of the acceleration counts for a gate on the accelerometer, but not for one on the
+    speed's rate."""
     drives, dt = raced.drives, raced.study.dt
     v, grade, felt = (np.asarray(x)[-1] for x in (drives.true_v_x, drives.true_grade, drives.true_a_x))
     rate = np.gradient(v, dt, axis=-1)

@@ -1,4 +1,4 @@
-"""The estimators: what each believes of the grade, and how it goes about the mass."""
+"""The estimators: what each assumes about the grade, and how it estimates the mass."""
 
 from __future__ import annotations
 
@@ -21,15 +21,22 @@ from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace import kit as statespace_kit
 
 WALK = 2e-3
-"""How far a grade that walks goes, rad per root second: some 4 degrees in ten minutes' changes, 0.1 degree in a second."""
+"""Walk of a walking grade, rad per root second: some 4 degrees over the changes of ten minutes, 0.1 degree in a second."""
 
 
 def contestants(study: Study) -> dict[str, Contestant]:
-    """All of them by name, the do-nothing ones first; where the brake is touched, those that pause meanwhile, too."""
+    """All estimators by name, beginning with the one that does nothing; with brake touches also those that pause during a
+    touch."""
     found = {
-        "first guess": Contestant(_guess, "the mass is the first guess, the grade that of a filter which believes it"),
-        "UKF": Contestant(_walking_grade(spread=0.4), "three states, the grade walks, an honest spread of the mass"),
-        "UKF, timid": Contestant(_walking_grade(spread=0.05), "the same, sure of its first guess by 5 %"),
+        "first guess": Contestant(
+            _guess, "the mass stays at the first guess; the grade by a filter that takes this mass as certain"
+        ),
+        "UKF": Contestant(
+            _walking_grade(spread=0.4), "three states, the grade walks, a realistic standard deviation of the mass"
+        ),
+        "UKF, timid": Contestant(
+            _walking_grade(spread=0.05), "the same with a standard deviation of 5 % for its first guess"
+        ),
         "AUKF as printed": Contestant(_adaptive(freeze=True), "eqs 22 to 25 around additive mass"),
         "AUKF": Contestant(_adaptive(freeze=False), "eqs 22 to 24: without the scaled covariance of eq 25"),
         "EKF": Contestant(_walking_grade(spread=0.4, kind=filters.Extended), "as the UKF, linearised (refs 9, 10)"),
@@ -37,18 +44,18 @@ def contestants(study: Study) -> dict[str, Contestant]:
             recursive_least_squares, "two forgetting factors on differences over a second (Vahidi et al. 2005)"
         ),
         "gated": Contestant(
-            of_library("gated"), "least squares above 0.6 m/s^2 as felt (ref. 8); the grade is what is left"
+            of_library("gated"), "least squares above 0.6 m/s^2 as felt (ref. 8); the grade is the remainder"
         ),
         "high-pass": Contestant(
-            of_library("high_pass"), "least squares of what is faster than 4 s (ref. 11); the grade is what is left"
+            of_library("high_pass"), "least squares of components faster than 4 s (ref. 11); the grade is the remainder"
         ),
         "kinematic grade": Contestant(
             of_library("kinematic_grade"), "grade by accelerometer and speed, then least squares (refs 12, 13)"
         ),
         "library's filter": Contestant(
-            of_library("filter"), "what `jaxveh.estimators.mass` recommends: accelerometer, offset, slip"
+            of_library("filter"), "recommended by `jaxveh.estimators.mass`: accelerometer, offset, slip"
         ),
-        "grade rate": Contestant(_smooth(), "the grade's rate walks: what is fast is the mass's"),
+        "grade rate": Contestant(_smooth(), "the grade's rate walks: fast changes are due to the mass"),
         "accelerometer": Contestant(_smooth(aided=True), "grade rate and accelerometer"),
         "accelerometer with bias": Contestant(_smooth(aided=True, bias=0.02), "the same, its offset a state"),
     }
@@ -56,30 +63,31 @@ def contestants(study: Study) -> dict[str, Contestant]:
         return found
     return found | {
         pausing_name("grade rate"): Contestant(
-            _smooth(waits=True), "pauses while the brake is touched, as the paper has it"
+            _smooth(waits=True), "pauses while the brake is touched, as in the paper"
         ),
         pausing_name("accelerometer"): Contestant(_smooth(aided=True, waits=True), "the same with the accelerometer"),
     }
 
 
 def pausing_name(name: str) -> str:
-    """The name of the contestant that pauses while the brake is touched, where `name` takes its force for an unknown one."""
+    """The name of the contestant that pauses during brake touches, where `name` itself treats their force as an unknown
+    one."""
     return f"{name}, pausing"
 
 
 TOLD = ("braking", "unknown_force")
-"""What wrappers are told beside the torques: whether the brake is touched (0 or 1), and the process noise of the speed."""
+"""Inputs of the wrappers besides the torques: whether the brake is touched (0 or 1), and the process noise of the speed."""
 
 FORCE_OF_A_TOUCH = 2.0
-"""m/s per root second: what a touched brake may do to the speed, whatever it is; four times the strongest touch over a second."""
+"""m/s per root second: what a touched brake may do to the speed; four times the strongest touch over a second."""
 
 
 def _run_filter(filter_, model: StateSpace, study: Study, drive: Drive, waits: bool = True) -> Found:
-    """A filter over the drive. While the brake is touched it `waits`, as the paper has it, or takes the brake's force for an
-    unknown one: then the speed is free for a while, and the grade goes on as it went."""
+    """A filter over the drive. While the brake is touched, it pauses if it `waits`, as in the paper; otherwise it treats the
+    brake's force as an unknown one: the speed is then free for a while, and the grade goes on."""
     time = times(study, drive.v_x.shape[0])
     now = drive.braking > 0.5
-    # A touch begins and ends between two rows: where either end of a step is braked, its force is unknown.
+    # A touch begins and ends between two rows: if either end of a step is braked, its force is unknown.
     touched = now | jnp.pad(now[:-1], (1, 0))
     force = jnp.where(touched, FORCE_OF_A_TOUCH, study.speed_noise)
     values = drive._asdict()
@@ -87,7 +95,7 @@ def _run_filter(filter_, model: StateSpace, study: Study, drive: Drive, waits: b
         filter_ = filters.Paused(filter_, "braking", {"v_x": 20.0, "grade": 0.01})
     elif study.touches:
         filter_ = filters.VaryingNoise(filter_, process={"v_x": "unknown_force"}, process_of="after")
-        # The accelerometer feels that force, too.
+        # The accelerometer measures that force, too.
         values["a_x"] = jnp.where(now, jnp.nan, drive.a_x)
     u = record_type("Inputs", model.inputs)(drive.torque, jnp.zeros_like(drive.torque), drive.braking, force)
     y = record_type("Measurements", model.channels)(*[values[name] for name in model.channels])
@@ -125,7 +133,7 @@ def _smooth(aided: bool = False, bias: float | None = None, waits: bool = False)
 def _adaptive(freeze: bool):
     def run(study, guess, drive):
         model = _model(study, guess, drive, mass_spread=0.4, mass_domain=Real(), grade_walk=WALK, grade_rate_walk=None)
-        # Large at first, as the paper has it: a fifth of the truck's mass.
+        # Large at first, as in the paper: a fifth of the truck's mass.
         inner = filters.ShrinkingProcess(filters.Unscented(), {"mass": 0.2 * study.mass})
         return _run_filter(Frozen(inner) if freeze else inner, model, study, drive)
 

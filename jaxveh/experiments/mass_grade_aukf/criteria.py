@@ -1,4 +1,4 @@
-"""The criteria: as they were asked, and what stands beside them."""
+"""The criteria as they were asked, and those that replace or repeat them."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ RATE, AIDED, BIASED = "grade rate", "accelerometer", "accelerometer with bias"
 """The contestants of the criteria."""
 
 STILL = ("held speed, no pedals", "pedals 0 m/s^2")
-"""Drives without pedal activity: nothing but what a held speed asks for, and with the speed's own wavering."""
+"""Drives without pedal activity: only the pedals that hold the speed, a constant one or the drive's own varying one."""
 
 
 def final_mass(study: str, estimator: str) -> str:
-    """The criterion of the final mass."""
+    """The name of the criterion of the final mass."""
     return f"{study}, {estimator}: final mass error, %"
 
 
 def settling_criterion(study: str, estimator: str) -> str:
-    """That of the time to settle."""
+    """The name of the criterion of the time to settle."""
     return f"{study}, {estimator}: within 3 % from then on, s"
 
 
@@ -28,28 +28,28 @@ GRADE = f"truck, {RATE}: grade RMSE, degrees"
 
 
 def bound_criterion(drive: str) -> str:
-    """That of the bound of three states."""
+    """The name of the criterion of the bound of three states."""
     return f"three states, {drive}: bound of the mass over its prior's spread"
 
 
 def error_criterion(drive: str) -> str:
-    """That of their error."""
+    """The name of the criterion of the error of three states."""
     return f"three states, {drive}: error of the mass over what the prior knew"
 
 
 _SEEDS = "median over the drives, worst first guess; "
-_TOLD = "told the torque at the wheels to the last digit, air and rolling resistance, and the noise of the sensors"
+_TOLD = "told the exact torque at the wheels, air and rolling resistance, and the noise of the sensors"
 _TRUCK = Terms(_SEEDS + _TOLD)
 _PAUSE = Terms(_SEEDS + _TOLD + "; pauses while the brake is touched, as was asked")
 _UNKNOWN = (
     _SEEDS
     + _TOLD
-    + "; a touched brake is an unknown force: made after the pause had missed the first bound on these drives"
+    + "; a touched brake is an unknown force: introduced after the pause had missed the first bound on these drives"
 )
 _BOUND = Terms(
-    f"Cramer-Rao bound of one drive, the grade linear over {WIDE_KNOT:g} s: by this quantity the report was first to say so"
+    f"Cramer-Rao bound of one drive, the grade linear over {WIDE_KNOT:g} s: the quantity that was chosen first to show it"
 )
-_ERROR = "pull of the grade's prior and noise at one drive's own grade, linear problem: chosen after the bound had not said so"
+_ERROR = "pull of the grade's prior and noise at one drive's own grade, linear problem: chosen after the bound did not show it"
 
 CRITERIA = {
     final_mass("truck", RATE): _TRUCK,
@@ -75,4 +75,4 @@ CRITERIA = {
         )
     },
 }
-"""The criteria by name; those that stand beside one as it was asked follow it."""
+"""The criteria by name; those that replace or repeat another follow it."""

@@ -22,17 +22,18 @@ AIR = 0.5 * 1.22 * 0.32 * 2.25
 """N s^2/m^2: half of density, drag coefficient and area of the paper's car."""
 
 HARMONICS = 20
-"""Of which speeds, pedals and grades are made."""
+"""Number of harmonics in speeds, pedals and grades."""
 
 LENGTH_OF_A_TOUCH = 2.0
 """s."""
 
 
 class Drive(NamedTuple):
-    """What filters may see, (T,) each, and the truth.
+    """The channels that filters may use, (T,) each, and the truth.
 
-    `v_x` (m/s) and `a_x` (m/s^2) measured; `torque` (N m) of the drive and, where it is known, the brakes, over what the wheels
-    get; `braking` (0 or 1): whether the brake pedal is touched. `true_v_x` (m/s), `true_grade` (rad), `true_a_x` (m/s^2).
+    `v_x` (m/s) and `a_x` (m/s^2) are measured; `torque` (N m) is that of the drive and, where it is known, of the brakes, at
+    the wheels; `braking` (0 or 1): whether the brake pedal is touched. `true_v_x` (m/s), `true_grade` (rad), `true_a_x`
+    (m/s^2).
     """
 
     v_x: Any
@@ -59,12 +60,13 @@ def numbers_of(study: Study) -> vehicles.CarNumbers:
 
 
 def model_car(study: Study) -> Longitudinal:
-    """What a filter knows of the vehicle; its mass is the truth's, to be replaced by a guess."""
+    """The filters' vehicle; its mass is the truth's, to be replaced by a guess."""
     return vehicles.build(numbers_of(study), Longitudinal)
 
 
 class Touching(AbstractManoeuvre):
-    """A manoeuvre that adds to the pedals, with touches of the brake: pulses of `torque` (N m) from each of `starts` (s)."""
+    """A manoeuvre that adds to the pedals, with touches of the brake: pulses of `torque` (N m) that begin at each of
+    `starts` (s)."""
 
     manoeuvre: AbstractManoeuvre
     starts: jax.Array
@@ -84,7 +86,7 @@ class Touching(AbstractManoeuvre):
 
 
 def manoeuvre_of(study: Study, pedals, key) -> Touching:
-    """How the study is driven, with pedal noise of `pedals` m/s^2."""
+    """How the vehicle of the study is driven, with pedal noise of `pedals` m/s^2."""
     car, (speed_key, drive_key, touch_key) = model_car(study), jax.random.split(key, 3)
     per_acceleration = study.mass * car.wheel_radius
     if study.start_speed is None:
@@ -125,7 +127,8 @@ def drive_once(study: Study, pedals, key) -> Drive:
 def _measure(study: Study, found: Recording, manoeuvre: Touching, key) -> Drive:
     t = times(study, round(study.duration / study.dt) + 1)
     pulses = manoeuvre.pulses(t)
-    # The motor (or the retarder) pulls both ways, and is known; the friction brake under a touch is not.
+    # The torque of the motor (or the retarder) acts in both directions and is known; that of the friction brake in a touch
+    # is not.
     torque = found["drive_torque"] - found["brake_torque"] + pulses
     noise = Gaussian({"v_x": study.v_x, "a_x": study.a_x}).sample(key, t.shape)
     a_x = found["true.a_x"]
@@ -141,7 +144,7 @@ def _measure(study: Study, found: Recording, manoeuvre: Touching, key) -> Drive:
 
 
 def disturb(drive: Drive, *, late: int = 0, offset: float = 0.0, scale: float = 1.0) -> Drive:
-    """Drives, (..., T), whose torque is told `late` rows late and `scale` times too large, and whose accelerometer has an
-    `offset` (m/s^2)."""
+    """Drives, (..., T), with a torque signal that is `late` rows late and `scale` times too large, and an accelerometer with
+    an `offset` (m/s^2)."""
     rows = np.maximum(np.arange(np.shape(drive.torque)[-1]) - late, 0)
     return drive._replace(torque=scale * np.asarray(drive.torque)[..., rows], a_x=np.asarray(drive.a_x) + offset)

@@ -1,4 +1,4 @@
-"""The study's pictures: the drive, the mass over time, the grade of one drive and its error, what pedals are worth."""
+"""The study's figures: the drive, the mass over time, the grade of one drive and its error, the effect of the pedals."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def figures(result: Reproduction) -> dict[str, Any]:
 
 
 def _names_and_colours(raced: Raced) -> list[tuple[str, str]]:
-    """Names and colours of the estimators of the figures that were in this race."""
+    """Names and colours of the estimators of the figures that took part in this race."""
     there = raced.found.design.axis("estimator").labels
     return [(name, colour) for name, colour in zip(SHOWN, SPELLS, strict=True) if name in there]
 
 
 def drive_figure(raced: Raced, seed: int = 0, guess: int = 0, figure: Any = None) -> Any:
-    """One drive, as figures 3, 4 and 8 of the paper for the truck and 12, 13 and 15 to 17 for the car: speed, force at the
-    wheels, acceleration; where brakes are touched, the brake's signal and whether a UKF that pauses goes on."""
+    """One drive, as in figures 3, 4 and 8 of the paper for the truck and 12, 13 and 15 to 17 for the car: speed, force at
+    the wheels, acceleration; with brake touches also the brake's signal and whether a pausing UKF goes on."""
     study = raced.study
     panels = 5 if study.touches else 3
     figure = (
@@ -91,7 +91,8 @@ def mass_figure(raced: Raced, guess: int = 0, figure: Any = None) -> Any:
 
 
 def grade_figure(raced: Raced, seed: int = 0, guess: int = 0, figure: Any = None) -> Any:
-    """True and estimated grade of one drive, as figures 9 and 18 of the paper, and the error as 10 and 19; the speed above."""
+    """True and estimated grade of one drive, as in figures 9 and 18 of the paper, the error as in 10 and 19, and the speed
+    above."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 6.0), layout="constrained") if figure is None else figure
     every = round(1.0 / raced.study.dt)
     with style():
@@ -131,7 +132,7 @@ def activity_figure(*raced: Raced, figure: Any = None) -> Any:
         axes.axhline(3.0, color="#444444", linewidth=0.6, linestyle=":")
         axes.set(
             xlabel="pedal activity [m/s²]", ylabel="final error of the mass [%]",
-            title=f"{raced[0].study.name}: what restless pedals are worth; median and quartiles, dotted: 3 %",
+            title=f"{raced[0].study.name}: effect of pedal activity; median and quartiles, dotted: 3 %",
         )  # fmt: skip
         figure.legend(loc="outside upper left", ncols=5)
     return figure

@@ -1,4 +1,4 @@
-"""What an estimator finds on a drive, and its numbers."""
+"""The estimates of an estimator on a drive, and their metrics."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jaxveh.experiments.mass_grade_aukf.settings import Study
 
 
 class Found(NamedTuple):
-    """Estimates over time: `mass` (kg) and `grade` (rad), (T,); `result`, the first failing code."""
+    """Estimates over time: `mass` (kg) and `grade` (rad), (T,); `result`: the first code that is not a success."""
 
     mass: Any
     grade: Any
@@ -20,19 +20,19 @@ class Found(NamedTuple):
 
 
 class Contestant(NamedTuple):
-    """`run(study, guess, drive) -> Found`, and what it is, in words."""
+    """`run(study, guess, drive) -> Found`, and a description, `what`."""
 
     run: Callable[[Study, Any, Drive], Found]
     what: str
 
 
 def metrics(study: Study, found: Found, drive: Drive) -> dict[str, Any]:
-    """Final mass error (share), when it settled within 3 % (s; infinite: never), RMSE of mass (share) and grade (degrees) over
-    the whole drive and after its first minute (grades: brake touches left out), mass and grade each second, whether either
-    moves in a row (where brakes are touched), and the result."""
+    """Final mass error (share), the time from which it stays within 3 % (s; infinite: never), RMSE of mass (share) and grade
+    (degrees) over the whole drive and after its first minute (grades: without brake touches), mass and grade each second,
+    whether either changes in a row (with brake touches), and the result."""
     error = jnp.abs(found.mass / study.mass - 1.0)
     time = times(study, error.shape[0])
-    # The last row outside ends the wait.
+    # It settles after the last row outside.
     outside = (error > 0.03) | ~jnp.isfinite(error)
     last = jnp.max(jnp.where(outside, time, -study.dt))
     settled = jnp.where(outside[-1], jnp.inf, last + study.dt)
@@ -57,7 +57,7 @@ def metrics(study: Study, found: Found, drive: Drive) -> dict[str, Any]:
 
 
 def of_a_point(study: Study, contestant: Contestant) -> Callable[[Any, Drive], dict[str, Any]]:
-    """The contestant's run of a design's point: `run(point, drive)`, as `sweeps.sweep` calls it."""
+    """The contestant's run at a design's point: `run(point, drive)`, as `sweeps.sweep` calls it."""
 
     def run(point, drive):
         return metrics(study, contestant.run(study, point.guess, drive), drive)

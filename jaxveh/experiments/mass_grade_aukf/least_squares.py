@@ -1,4 +1,4 @@
-"""What the paper cites that has no filter of the car: least squares of force and acceleration, and the grade left over."""
+"""The paper's references without a filter of the car: least squares of force and acceleration, with the grade as remainder."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ OVER = 1.0
 """s over which speeds are differenced and torques averaged for the least squares."""
 
 SPREAD = 0.4
-"""What the library's methods know of the mass at first, a share of it: as much as the paper's filters do."""
+"""Prior's standard deviation of the mass in the library's methods, a share of it: as large as in the paper's filters."""
 
 FORGOTTEN = 2.0
-"""s after a touch of the brake in which torques count as unknown still: so long do the library's low-passes remember."""
+"""s after a brake touch in which torques still count as unknown: the memory of the library's low-passes."""
 
 
 class Averages(NamedTuple):
-    """From row to row over the last `OVER` seconds, (T - OVER / dt,): rate of the speed (m/s^2), force at the wheels without the
-    air's (N), and whether the brake was touched."""
+    """From row to row over the last `OVER` seconds, (T - OVER / dt,): rate of the speed (m/s^2), force at the wheels less
+    the air drag (N), and whether the brake was touched."""
 
     rate: Any
     force: Any
@@ -40,9 +40,9 @@ class Averages(NamedTuple):
 
 
 def averages_of(study: Study, drive: Drive) -> Averages:
-    """Of a drive, from the first row on that has such a past."""
+    """The averages of a drive, from the first row with `OVER` seconds before it."""
     car, n = model_car(study), round(OVER / study.dt)
-    # Trapezia between the rows whose speeds are differenced.
+    # Trapezoidal rule between the rows whose speeds are differenced.
     running = lambda x: jnp.concatenate([jnp.zeros(1), jnp.cumsum(0.5 * (x[1:] + x[:-1]))])
     mean = lambda x: (running(x)[n:] - running(x)[:-n]) / n
     force = mean(drive.torque / car.wheel_radius - car.drag * drive.v_x**2)
@@ -52,7 +52,7 @@ def averages_of(study: Study, drive: Drive) -> Averages:
 def recursive_least_squares(study: Study, guess, drive: Drive) -> Found:
     """(dv/dt + air / m0) = F / m - g (sin grade + f_r): linear in 1 / m and the sum of grade and rolling resistance.
 
-    The air's drag and the turning wheels count with the first guess' mass; they are a few per cent.
+    Air drag and the inertia of the wheels are computed with the first guess of the mass; they are a few per cent.
     """
     car, (rate, force, braked) = model_car(study), averages_of(study, drive)
     n = round(OVER / study.dt)
@@ -66,12 +66,12 @@ def recursive_least_squares(study: Study, guess, drive: Drive) -> Found:
     )  # fmt: skip
     time = times(study, rate.shape[0] + n)[n:]
     u = record_type("Inputs", ("kilonewton",))(force / 1000.0)
-    # Averages overlap: every n-th row alone is new.
+    # Averages overlap: only every n-th row is new.
     fresh = (jnp.arange(rate.shape[0]) % n == 0) & ~braked
     y = record_type("Measurements", ("rate",))(jnp.where(fresh, rate, jnp.nan))
     method = observers.RecursiveLeastSquares(np.array([1.0, 0.8]), separate=True)
     estimate = filters.scan(method, model, Row(time, u, y))
-    # Never negative, which the reciprocal would make of a wild first row.
+    # Never negative: the reciprocal would otherwise turn a wild first row into a negative mass.
     found = 1000.0 / jnp.maximum(estimate.mean.per_tonne, 0.02) - wheels
     slope = estimate.mean.pull / GRAVITY - car.rolling_resistance
     rows = drive.v_x.shape[0]
@@ -79,11 +79,11 @@ def recursive_least_squares(study: Study, guess, drive: Drive) -> Found:
 
 
 def of_library(name: str) -> Callable[[Study, Any, Drive], Found]:
-    """The mass by a method of `jaxveh.estimators.mass` as it is, from each first guess.
+    """The mass by a method of `jaxveh.estimators.mass` with its defaults, from each first guess.
 
-    Its grade: that of the same name in `jaxveh.estimators.grade` where the method goes by one, else what the force on that mass
-    leaves over (`grade_of_force`). While the brake is touched and `FORGOTTEN` after that the torque is told as not known: the
-    library's methods leave such rows out.
+    The grade is that of the method of the same name in `jaxveh.estimators.grade`, if there is one, otherwise the remainder
+    of the force on that mass (`grade_of_force`). While the brake is touched, and `FORGOTTEN` after it, the torque is given
+    as unknown: the library's methods leave such rows out.
     """
 
     def run(study, guess, drive):
@@ -103,8 +103,8 @@ def of_library(name: str) -> Callable[[Study, Any, Drive], Found]:
 
 
 def _specification(study: Study):
-    """The car's file. The truth's body does not pitch, so that the file says nothing of that."""
-    # Its tyres' coefficients are plain numbers, inside of a program, too.
+    """The car's file. The truth's body does not pitch, so the file has no pitch gradient."""
+    # The coefficients of its tyres must be plain numbers, also inside a program.
     with jax.ensure_compile_time_eval():
         return dataclasses.replace(vehicles.specification_of(numbers_of(study)), pitch_gradient=None)
 
@@ -129,8 +129,8 @@ def _first_failure(result):
 
 
 def grade_of_force(study: Study, mass, drive: Drive):
-    """The grade (rad), (T,), at which a mass (kg), (T,), moves as it did over the last `OVER` seconds:
-    `sin(grade) = (F - (m + 4 J_w / r^2) dv/dt) / (m g) - f_r`. It stays while the brake is touched."""
+    """The grade (rad), (T,), at which a mass (kg), (T,), moves as it did over the last `OVER` seconds: `sin(grade) = (F - (m
+    + 4 J_w / r^2) dv/dt) / (m g) - f_r`. It is held while the brake is touched."""
     car, (rate, force, braked) = model_car(study), averages_of(study, drive)
     own = mass[mass.shape[0] - rate.shape[0] :]
     wheels = 4.0 * car.wheel_inertia / car.wheel_radius**2
@@ -141,9 +141,9 @@ def grade_of_force(study: Study, mass, drive: Drive):
 
 
 def _from_the_start(values, rows: int, first):
-    """Values of the last rows, with the `first` before them, (rows,)."""
+    """Values of the last rows, with `first` in the rows before them, (rows,)."""
     n = rows - values.shape[0]
-    # Of `jnp.concatenate` here XLA 0.10's program for many drives on a CPU reads beside its memory, and dies.
+    # With `jnp.concatenate` here, XLA 0.10's program for many drives on a CPU reads outside its memory and crashes.
     return jnp.where(jnp.arange(rows) < n, first, jnp.pad(values, (n, 0), mode="edge"))
 
 

@@ -1,9 +1,10 @@
-"""What a drive can tell about the mass at all, and what a belief about the grade makes of it.
+"""The information about the mass in a drive, and the effect of a prior of the grade.
 
-The Cramer-Rao bound alone misleads here. It averages over grades that owe nothing to the torque; but a driver who holds the speed
-answers the grade with torque. Then one course of torque and speed is explained as well by a heavier car on a flatter road, and
-what decides is the prior: a grade that walks likes small steps, and takes the heavier car. So the error is told as two parts at
-the drive's own grade, in the linear problem: how far the grade's prior pulls the mass, and what the noise does.
+The Cramer-Rao bound alone misleads here. It averages over grades that are independent of the torque; but a driver who holds
+the speed answers the grade with torque. One course of torque and speed is then explained equally well by a heavier car on a
+flatter road, and the prior decides: a grade that walks prefers small steps, and so the heavier car. The error is therefore
+given in two parts at the drive's own grade, in the linear problem: how far the grade's prior pulls the mass, and the effect
+of the noise.
 """
 
 from __future__ import annotations
@@ -27,17 +28,18 @@ KNOT, WIDE_KNOT = 1.0, 5.0
 """s between the knots of the unknown grade; and in the bound by which the mass was first judged."""
 
 MASS_SPREAD, GRADE_SPREAD = 0.4, 0.03
-"""What the prior knows: of the mass's logarithm, and of the grade (rad)."""
+"""Standard deviations of the prior: of the mass's logarithm, and of the grade (rad)."""
 
 OBSERVABLE = 0.1
-"""Share of the prior's spread below which the error must be for the mass to be called observable; above 1 it is unobservable."""
+"""Largest share of the prior's standard deviation at which the mass is called observable; above 1 it is unobservable."""
 
 
 class Known(NamedTuple):
-    """Of the mass's logarithm, by least squares of a whole drive whose grade is believed to walk, or whose grade's rate is.
+    """The accuracy of the mass's logarithm by least squares over a whole drive, with a model in which the grade walks, or
+    its rate.
 
     `bound`: the Cramer-Rao bound, which averages over grades; `pull`: how far the prior of the grade pulls the mass at this
-    drive's own grade; `noise`: the standard deviation that the speed's noise leaves.
+    drive's own grade; `noise`: the standard deviation due to the noise of the speed.
     """
 
     bound: float
@@ -51,7 +53,7 @@ class Known(NamedTuple):
 
     @property
     def share(self) -> float:
-        """The error over what the prior knew: 1 and above, the drive tells nothing."""
+        """The error over the prior's standard deviation: with 1 and above, the drive contains no information."""
         return self.error / MASS_SPREAD
 
     @property
@@ -63,15 +65,17 @@ class Known(NamedTuple):
 
 
 def known_of_mass(study: Study, drive: Drive, smooth: bool = False) -> Known:
-    """What the speed of one drive tells of the mass, with a grade that walks (three states), or `smooth`: whose rate does (four).
+    """The accuracy of the mass from the speed of one drive, with a grade that walks (three states), or `smooth`: with a rate
+    of the grade that walks (four states).
 
-    The grade is linear between knots. Unknown are the mass, the first grade (and rate), the first speed, and what is new at each
-    knot: the grade's increment, or its rate's. The mass has no prior here, so that the pull is the grade's alone.
+    The grade is linear between knots. The unknowns are the mass, the first grade (and rate), the first speed, and the
+    innovation at each knot: the increment of the grade, or of its rate. The mass has no prior here, so the pull is that of
+    the grade alone.
     """
     walk, first = (study.grade_rate_walk, 2) if smooth else (WALK, 1)
     predict, at = predictions(study, drive, smooth)
     news = np.full(at.size - 2 - first, walk * KNOT**0.5)
-    # A rate as the four states' prior has it: what its walk makes of it in half a minute.
+    # The rate's standard deviation as in the prior of the four states: that of its walk after half a minute.
     spread = np.concatenate([[np.inf, 1.0, GRADE_SPREAD], [walk * 30.0**0.5] * (first - 1), news])
     sensitivity = np.asarray(jax.jacfwd(predict)(jnp.asarray(at)))
     prior = np.diag(1.0 / spread**2)
@@ -84,13 +88,14 @@ def known_of_mass(study: Study, drive: Drive, smooth: bool = False) -> Known:
 
 
 def bound_of_mass(study: Study, drive: Drive, knot: float = WIDE_KNOT) -> Observability:
-    """Cramer-Rao bounds of mass and first grade from the speed of one drive, with a grade that walks, as three states have it.
+    """Cramer-Rao bounds of mass and first grade from the speed of one drive, with a grade that walks, as in the three
+    states.
 
-    By these the report was first to say whether the mass can be observed. They average over grades that owe nothing to the
-    torque.
+    The report first used these bounds to judge whether the mass is observable. They average over grades that are independent
+    of the torque.
     """
     predict, at = predictions(study, drive, False, knot)
-    # The named ones first: mass and grade, then the first speed.
+    # The parameters of interest come first: mass and grade, then the first speed.
     order = np.array([0, 2, 1, *range(3, at.size)])
     spread = np.concatenate([[MASS_SPREAD, GRADE_SPREAD, 1.0], np.full(at.size - 3, WALK * knot**0.5)])
     ordered = lambda z: predict(z[order])
@@ -98,7 +103,8 @@ def bound_of_mass(study: Study, drive: Drive, knot: float = WIDE_KNOT) -> Observ
 
 
 def predictions(study: Study, drive: Drive, smooth: bool, knot: float = KNOT):
-    """Whitened speeds as a function of the unknowns [log mass, first speed, first grade, (first rate), news]; the truth's."""
+    """Whitened speeds as a function of the unknowns [log mass, first speed, first grade, (first rate), innovations]; and
+    their truth."""
     car, rows = model_car(study), drive.v_x.shape[0]
     knots = knot * np.arange(np.ceil((rows - 1) * study.dt / knot) + 1)
     time = times(study, rows)
@@ -136,5 +142,5 @@ def _rates(system, t, x, torque):
 
 
 def car_inputs(torque):
-    """The longitudinal car's inputs of a torque that pulls both ways."""
+    """The longitudinal car's inputs for a torque that acts in both directions."""
     return record_type("Inputs", ("drive_torque", "brake_torque"))(torque, jnp.zeros_like(torque))

@@ -1,4 +1,4 @@
-"""The report: tables, checks against honest criteria, and what the printed numbers rest on."""
+"""The report: tables, checks against honest criteria, and the basis of the printed numbers."""
 
 from __future__ import annotations
 
@@ -23,26 +23,27 @@ from jaxveh.experiments.report import Check, above, at_most, spread, with_terms
 from jaxveh.sweeps import IN_MEMORY, Stores, Table
 
 GENTLE, LIVELY = (0.0, 0.03), 0.1
-"""Pedal activities, m/s^2; the checks are of the lively one, whose mean acceleration is the paper's."""
+"""Pedal activities, m/s^2; the checks use the lively one, whose mean acceleration is the paper's."""
 
 FEW = 20
-"""Seeds, at most, of the gentle drives and of the disturbances: medians over 20 are enough to tell 50 % from 5 %. The time to
-settle, which spreads fourfold between quartiles, is known better from more: `--seeds 40`."""
+"""Most seeds of the gentle drives and of the disturbances: medians over 20 are enough to distinguish 50 % from 5 %. The time
+to settle, which varies fourfold between quartiles, needs more of them: `--seeds 40`."""
 
 LATE = 0.1
-"""s by which the torque's signal is late in one of the disturbances."""
+"""s by which the torque signal is late in one of the disturbances."""
 
 OFFSET = 0.01
-"""m/s^2 of the accelerometer in another."""
+"""m/s^2 of the accelerometer in another disturbance."""
 
 DISTURBED = (RATE, AIDED, BIASED)
-"""The estimators that meet wrong signals."""
+"""The estimators that are run with wrong signals."""
 
 
 class Reproduction(NamedTuple):
-    """Everything the experiment found: `truck` and `car` with lively pedals; the truck with `gentle` ones; the truck
-    `disturbed`, by name; what a drive of the truck can tell three states and four, by what its driver does; and of the drives
-    without pedal activity the Cramer-Rao `bounds`, by which the report was first to judge."""
+    """All results of the experiment: `truck` and `car` with lively pedals; the truck with `gentle` ones; the truck
+    `disturbed`, by name; the accuracy of the mass from a drive of the truck for three states and four, by the driver's
+    pedals (`observed`); and for the drives without pedal activity the Cramer-Rao `bounds`, by which the report first judged
+    them."""
 
     seeds: int
     truck: Raced
@@ -64,7 +65,7 @@ def run(
 ) -> Reproduction:
     """All drives and estimators over `seeds` seeds (at least two)."""
     truck_study, car_study = truck_study or truck(), car_study or car()
-    # Other drives than those on which the noises were chosen, whose key is that of `seed` itself.
+    # Other drives than those on which the noises were chosen, which had the key of `seed` itself.
     key = jax.random.fold_in(jax.random.key(seed), 1)
     truck_key, car_key = jax.random.split(key)
     few = min(seeds, FEW)
@@ -114,7 +115,7 @@ def _disturbance_races(study: Study, drives: Drive, progress: Progress, stores: 
 
 
 def _example_drive(study: Study, gentle: Drive, lively: Drive, key) -> dict[str, Drive]:
-    """One drive by what the driver does."""
+    """One drive for each pedal activity."""
     steady = dataclasses.replace(study, speed_std=0.0)
     seen = {STILL[0]: drive_once(steady, 0.0, jax.random.split(key, 2)[0])}
     first = lambda drives, i: Drive(*(jnp.asarray(leaf[i, 0]) for leaf in drives))
@@ -126,7 +127,8 @@ def _example_drive(study: Study, gentle: Drive, lively: Drive, key) -> dict[str,
 def as_printed(
     *, seeds: int = 20, seed: int = 0, progress: Progress = silent, stores: Stores = IN_MEMORY
 ) -> list[Table]:
-    """The paper's own filters alone, truck and car: additive mass, eq 25 as it stands and left out, a walking grade."""
+    """Only the paper's own filters, for truck and car: additive mass, with eq 25 as printed and without it, a walking
+    grade."""
     own = ("first guess", "UKF", "UKF, timid", "AUKF as printed", "AUKF")
     found, studies = [], (truck(guesses=(4000.0,)), car())
     for i, (study, key) in enumerate(zip(studies, jax.random.split(jax.random.key(seed)), strict=True)):
@@ -188,7 +190,7 @@ def check(result: Reproduction) -> list[Check]:
 
 
 def tables(result: Reproduction) -> list[Table]:
-    """The tables, the do-nothing first guess in each."""
+    """The tables; each contains the first guess, which does nothing."""
     return [
         drives_table(result.truck, result.car),
         _race_table(result.truck, "Truck"),
@@ -230,7 +232,7 @@ def _activity_table(result: Reproduction) -> Table:
     ]
     rows = [(name, *errors(name)) for name in contestants(result.truck.study)]
     heads = [f"pedals {pedals:g} m/s^2" for pedals in (*GENTLE, LIVELY)]
-    return Table("Truck: final mass error in %, by what the pedals do", ("estimator", *heads), rows)
+    return Table("Truck: final mass error in %, by pedal activity", ("estimator", *heads), rows)
 
 
 def _guess_table(result: Reproduction) -> Table:
@@ -251,7 +253,7 @@ def _disturbed_table(result: Reproduction) -> Table:
     rows = [("nothing", *[spread(_of(result.truck, "mass_error", name), scale=100.0) for name in DISTURBED])]
     for what, raced in result.disturbed.items():
         rows.append((what, *[spread(_of(raced, "mass_error", name), scale=100.0) for name in DISTURBED]))
-    return Table("Truck: final mass error in % where a signal is wrong", ("disturbance", *DISTURBED), rows)
+    return Table("Truck: final mass error in % with a wrong signal", ("disturbance", *DISTURBED), rows)
 
 
 def _observed_table(result: Reproduction) -> Table:
@@ -262,7 +264,7 @@ def _observed_table(result: Reproduction) -> Table:
             rows.append((drive, states, *cells))
     heads = ("Cramer-Rao bound, %", "pull of the grade's prior, %", "noise, %", "error over prior", "the mass is")
     return Table(
-        "Truck: what a drive tells of the mass, whoever estimates, where the grade walks (three states) or its rate (four)",
+        "Truck: information about the mass in a drive, for any estimator, if the grade walks (three states) or its rate (four)",
         ("drive", "states", *heads),
         rows,
     )

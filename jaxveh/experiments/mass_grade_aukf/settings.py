@@ -1,4 +1,4 @@
-"""What the paper prints, and what the study assumes where it is silent."""
+"""The printed settings of the paper, and the assumptions of the study where the paper gives none."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ CITATION = """@article{massgrade_aukf,
 }"""
 
 TABLE_1 = {3000.0: 5734.0, 3500.0: 5735.0, 4500.0: 5765.0, 5000.0: 5733.0}
-"""Truck: first guess of the mass -> the AUKF's estimate, kg, as printed. The printed errors (2.86, 0.41, 1.81, 2.75 %) do not
-follow from these; theirs are 0.42, 0.40, 0.12 and 0.43 %."""
+"""Truck: first guess of the mass -> the AUKF's estimate, kg, as printed. The printed errors (2.86, 0.41, 1.81, 2.75 %) do
+not follow from these masses, whose errors are 0.42, 0.40, 0.12 and 0.43 %."""
 
 COMPARED = {"UKF": 5795.0, "AUKF": 5721.0}
 """Truck from 4000 kg, kg, as printed: both 0.64 % off."""
@@ -23,7 +23,7 @@ GRADE_RMSE = {"truck": {"AUKF": 0.38, "UKF": 0.51}, "car": {"AUKF": 0.16, "UKF":
 """Degrees, as printed."""
 
 GATE = 0.6
-"""m/s^2 below which reference 8 of the paper stops to estimate."""
+"""m/s^2 below which reference 8 of the paper stops estimating."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,12 +31,12 @@ class Study:
     """A drive and its sensors. Truth: a car of seven degrees of freedom on a road of random grade.
 
     `name`: `truck` or `car`; `mass` kg, the truth, and `guesses`, from which filters start; `duration` s, rows every `dt` s,
-    `max_step` s of the simulation. `speed` m/s with a spread of `speed_std` over `speed_time` s, after a gentle start from
-    `start_speed` (m/s) over `start_time` (s; None: none). Pedals: coloured noise of `pedals` m/s^2 over `pedal_time` s.
-    `grade_std` rad over `grade_length` m, no wave shorter than `grade_shortest` m. `touches`: how often the brake is touched in
-    the first 30 s, `touch` m/s^2 strongly. Sensors: `v_x` m/s, `a_x` m/s^2. `grade_rate_walk` (rad/s per sqrt(s)) and
-    `speed_noise` (m/s per sqrt(s)) of the filters: those of the greatest likelihood on drives of other keys (so that the truth
-    has no part in them), within a factor of three.
+    `max_step` s of the simulation. `speed` m/s with a standard deviation of `speed_std` over `speed_time` s, after a gentle
+    start from `start_speed` (m/s) over `start_time` (s; None: no start). Pedals: coloured noise of `pedals` m/s^2 over
+    `pedal_time` s. `grade_std` rad over `grade_length` m, with no wave shorter than `grade_shortest` m. `touches`: how often
+    the brake is touched in the first 30 s, with a deceleration of `touch` m/s^2. Sensors: `v_x` m/s, `a_x` m/s^2.
+    `grade_rate_walk` (rad/s per sqrt(s)) and `speed_noise` (m/s per sqrt(s)) of the filters: those of the greatest
+    likelihood on drives of other keys, within a factor of three, so that the truth is not used.
     """
 
     name: str = "truck"
@@ -66,7 +66,7 @@ class Study:
 def truck(**changes) -> Study:
     """The paper's TruckSim drive: 560 s at 40 to 85 km/h, accelerations below 0.4 m/s^2, a grade of 5.5 degrees peak to peak.
 
-    Not printed, and ours: the driver's pedals, the grade's spectrum, torque, sensors' noise.
+    Not printed and chosen here: the driver's pedals, the grade's spectrum, the torque, the sensors' noise.
     """
     return Study(**changes)
 
@@ -74,7 +74,7 @@ def truck(**changes) -> Study:
 def car(**changes) -> Study:
     """The paper's test car: gently to 20 km/h, brake touches in the first 30 s.
 
-    It starts at a walk of 1 m/s: towards standstill the wheels' spin becomes ever stiffer, and tells nothing of the mass.
+    It starts at 1 m/s: towards standstill the wheel spins become ever stiffer, without information about the mass.
     """
     settings = dict(
         name="car", mass=1700.0, guesses=(1300.0,), duration=120.0, max_step=0.0005,

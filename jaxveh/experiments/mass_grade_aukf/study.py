@@ -1,4 +1,4 @@
-"""The runs: drives once, then every estimator on the same drives."""
+"""The runs: each drive once, then every estimator on the same drives."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from jaxveh.sweeps import IN_MEMORY, Stores
 
 
 class Raced(NamedTuple):
-    """One study: the `drives`, (pedals, seeds, T) each, and what the estimators made of them, `found` with the axes estimator,
+    """One study: the `drives`, (pedals, seeds, T) each, and the results of the estimators, `found`, with the axes estimator,
     pedals, guess and seed."""
 
     study: Study
@@ -37,7 +37,7 @@ def drives_of(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> Drive:
-    """Drives of the study with each pedal activity (m/s^2), one a seed: (pedals, seeds, T)."""
+    """Drives of the study with each pedal activity (m/s^2), one per seed: (pedals, seeds, T)."""
     check_whole("seeds", seeds, 2)
     run = lambda point, key: drive_once(study, point.pedals, key)
     found = stores.sweep("drives", run, sweeps.Design(pedals=pedals), seeds, key, batch=batch, progress=progress)

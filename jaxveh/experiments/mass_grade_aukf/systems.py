@@ -1,4 +1,4 @@
-"""Every model, method, table and figure of paper 004, and who has it here."""
+"""Every model, method, table and figure of paper 004, and its place in this package."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ SYSTEMS = (
     System("the car: brake signal, the filter's state", "figs 12-19", ("experiments.mass_grade_aukf.figures",)),
     System("least squares behind a gate", "introduction [8]", _ways("mass", "gated")),
     System("extended filters", "introduction [9, 10]", _ways("mass", "filter", "joint")),
-    System("least squares of what is fast", "introduction [11]", _ways("mass", "high_pass")),
+    System("least squares of the fast components", "introduction [11]", _ways("mass", "high_pass")),
     System(
-        "grade of accelerometer and speed, then least squares", "introduction [12]", _ways("mass", "kinematic_grade")
+        "grade from accelerometer and speed, then least squares", "introduction [12]", _ways("mass", "kinematic_grade")
     ),
     System("accelerometer and two forgetting factors", "introduction [13]", _ways("mass", "forgetting")),
     System("satellites", "introduction", _ways("grade", "satellite")),
-    System("the paper's sentences", "3, 4", ("experiments.mass_grade_aukf.claims",)),
-    System("lidar", "introduction", (), "a sensor of the road ahead, which no vehicle model feels"),
+    System("the paper's claims", "3, 4", ("experiments.mass_grade_aukf.claims",)),
+    System("lidar", "introduction", (), "a sensor of the road ahead, which no vehicle model includes"),
     System("mass and grade of a log, without code", "", _ways("mass", "filter")[:1] + _ways("grade", "filter")),
 )

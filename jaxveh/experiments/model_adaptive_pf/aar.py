@@ -1,4 +1,4 @@
-"""The paper's adaptive autoregression: a particle filter whose transition is learned from its own estimates."""
+"""The paper's adaptive autoregression: a particle filter with a transition that is learned from its own estimates."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from jaxveh.statespace import AbstractFilter, AbstractWrapper, StateSpace
 
 
 class Learned(NamedTuple):
-    """What has been learned of each state, by name: `keeps` (-), its coefficient a; `spread`, the A of eqs 22 to 24 (its unit
+    """The learned numbers of each state, by name: `keeps` (-), its coefficient a; `spread`, the A of eqs 22 to 24 (its unit
     squared), or the P of least squares (one over that)."""
 
     keeps: BodyState
@@ -31,7 +31,7 @@ class AutoRegressive(AbstractWrapper):
     - `as_printed`: `A = (1 - U) A + U X^2`, `k = U A X / (U X A X + 1)`, `a += k e`. Erratum: A stands where least
       squares has its inverse, so that large numbers (v_x) learn in one row and small ones (v_y, yaw rate) never.
 
-    Either starts at a = 1; P at `1 / first^2`, as if the state had been about `first` once (m/s, m/s, rad/s).
+    Both start at a = 1, and with P at `1 / first^2`, as if the state had been about `first` once (m/s, m/s, rad/s).
     """
 
     inner: AbstractFilter
@@ -58,7 +58,7 @@ class AutoRegressive(AbstractWrapper):
         return kit.Remembering(inside, memory), info
 
     def _learn(self, a, spread, X, now):
-        """The coefficient and its spread after a row."""
+        """The coefficient and its `spread` after a row."""
         U, e = self.update, now - a * X
         if self.as_printed:
             A = (1.0 - U) * spread + U * X**2
@@ -72,8 +72,8 @@ def _with_memory(model: StateSpace, memory: Learned) -> Any:
 
 
 class Fitted(NamedTuple):
-    """`coefficients` [A_1, ..., A_p] (3, 3 p) and the `spread` P (3 p, 3 p) of least squares, and `past`: the last p means, the
-    newest first (3 p,); all in units of `first`."""
+    """`coefficients` [A_1, ..., A_p] (3, 3 p) and the `spread` P (3 p, 3 p) of least squares, and `past`: the last p means,
+    the newest first (3 p,); all in units of `first`."""
 
     coefficients: Any
     spread: Any
@@ -81,12 +81,13 @@ class Fitted(NamedTuple):
 
 
 class MatrixAutoRegressive(AbstractWrapper):
-    """`inner` of a `matrix_autoregression` model: eqs 20 to 25 of order `order`, each state by all states of the last p rows.
+    """`inner` of a `matrix_autoregression` model: eqs 20 to 25 of order `order`, each state from all states of the last p
+    rows.
 
-    With phi the means of these rows, e = X_t - A phi and U = `update`, least squares with forgetting, corrected as
-    `AutoRegressive` is: `k = P phi / (1 - U + phi' P phi)`, `A += e k'`, `P = (P - k phi' P) / (1 - U)`. It starts at A_1 = I,
-    the rest at nothing, and P = I in units of `first` (m/s, m/s, rad/s). Rows before the last are the filter's means, not each
-    particle's own past.
+    With phi the means of these rows, e = X_t - A phi and U = `update`, least squares with forgetting, corrected as in
+    `AutoRegressive`: `k = P phi / (1 - U + phi' P phi)`, `A += e k'`, `P = (P - k phi' P) / (1 - U)`. It starts at A_1 = I
+    with the other matrices zero, and P = I in units of `first` (m/s, m/s, rad/s). Rows before the last are the filter's
+    means, not each particle's own past.
     """
 
     inner: AbstractFilter
@@ -114,7 +115,7 @@ class MatrixAutoRegressive(AbstractWrapper):
         return kit.Remembering(inside, self.learn(memory, self._scaled(inside.mean))), info
 
     def learn(self, memory: Fitted, now: Any) -> Fitted:
-        """What is known after the mean `now` (3,)."""
+        """The coefficients, their spread and the past after the mean `now` (3,)."""
         U, phi = self.update, memory.past
         k = memory.spread @ phi / (1.0 - U + phi @ memory.spread @ phi)
         A = memory.coefficients + jnp.outer(now - memory.coefficients @ phi, k)

@@ -1,5 +1,5 @@
-"""What the paper has and its own race does not: seven degrees of freedom with wheel spins, autoregressions of a higher order with
-a matrix, process noise with tails; and its figure 4, six states by three methods."""
+"""Parts of the paper that its own race does not contain: seven degrees of freedom with wheel spins, autoregressions of higher
+order with a matrix, process noise with tails; and its figure 4, six states by three methods."""
 
 from __future__ import annotations
 
@@ -31,13 +31,14 @@ RIVALS = {
     "PF, 7 degrees of freedom": "PF, no relaxation",
     SEVEN: "PF, no relaxation",
 }
-"""Who stands beside whom of the race: the same but for what is new. Tyres of the seven degrees of freedom do not relax."""
+"""Each entrant's rival in the race, which differs only in what is new. The tyres of the seven degrees of freedom do not
+relax."""
 
 FEW = 10
-"""Seeds, at most, of all this: its differences are large."""
+"""Most seeds of all this: its differences are large."""
 
 SLOWLY = ("open loop", PLAIN, "AAR", REDESIGNED)
-"""Who is tried at 30 km/h and on a loose road."""
+"""The estimators that run at 30 km/h and on a loose road."""
 
 FOUR = {"strong tracking": "strong tracking", PLAIN: "particle filter", "AAR as printed": "the paper's, as printed",
         "AAR": "the paper's, corrected"}  # fmt: skip
@@ -48,14 +49,14 @@ STATES = {"v_x": "m/s", "v_y": "m/s", "a_x": "m/s^2", "a_y": "m/s^2", "yaw_rate"
 
 
 def entrants(study: Study) -> dict[str, Contestant]:
-    """Those of `RIVALS`."""
+    """The estimators of `RIVALS`."""
     particles = filters.ParticleFilter(study.particles)
     haar = filters.HaarParticles(particles, window=study.window, forgetting=study.forgetting)
     matrix = lambda order: _matrix_filter(MatrixAutoRegressive(haar, order, study.update))
     return {
-        "AAR, matrix": Contestant(matrix(1), "each state by all three of the last row, least squares"),
-        "AAR, matrix, order 2": Contestant(matrix(2), "by those of two rows"),
-        HEAVY: Contestant(_heavy_filter(particles), "the dynamics, process noise of the alpha-stable mixture, too"),
+        "AAR, matrix": Contestant(matrix(1), "each state from all three of the last row, least squares"),
+        "AAR, matrix, order 2": Contestant(matrix(2), "from those of two rows"),
+        HEAVY: Contestant(_heavy_filter(particles), "the dynamics, also the process noise an alpha-stable mixture"),
         "PF, 7 degrees of freedom": Contestant(
             _spinning_filter(particles), "wheel spins are states, wheel speeds measured; the paper's car"
         ),
@@ -88,7 +89,7 @@ def _spinning_filter(filter_) -> Run:
 
 
 def beside_table(raced: Raced, beside: Raced) -> Table:
-    """Each entrant's sideslip beside its rival's on the same drives, and what it says of the wheels' slip."""
+    """Each entrant's sideslip and its ratio to its rival's on the same drives, and its error of the wheels' slip."""
     rows = []
     every, seeds = entrants(beside.study), beside.found.seeds
     for name in ("open loop", *RIVALS):
@@ -102,7 +103,7 @@ def beside_table(raced: Raced, beside: Raced) -> Table:
     heads = [head for case in beside.cases for head in (f"'{case}', degrees", "over the rival's")]
     slips = [f"wheels' slip, %, '{case}'" for case in beside.cases]
     return Table(
-        f"What the paper has beside: sideslip RMSE, median [quartiles] over {beside.found.seeds} seeds, and paired ratios [95 %]",
+        f"More of the paper: sideslip RMSE, median [quartiles] over {beside.found.seeds} seeds, and paired ratios [95 %]",
         ("estimator", "rival", *heads, *slips, "what it is"),
         rows,
         2,
@@ -110,7 +111,7 @@ def beside_table(raced: Raced, beside: Raced) -> Table:
 
 
 def six_table(raced: Raced, case: str = "both") -> Table:
-    """The six states of figure 4 by the paper's three methods, beside doing nothing and what was redesigned."""
+    """The six states of figure 4 by the paper's three methods, doing nothing and the redesigned filter."""
     rows = []
     for name in ("open loop", *FOUR, REDESIGNED):
         cells = [spread(raced.of(state, name, case)) for state in STATES]

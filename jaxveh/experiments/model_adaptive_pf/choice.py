@@ -1,10 +1,10 @@
-"""The redesigned filters' settings, chosen by their own likelihood on drives that no table shows.
+"""The redesigned filters' settings, chosen by their own likelihood on drives that are in no table.
 
     python -m jaxveh.experiments.model_adaptive_pf.choice
 
-prints log-likelihoods, summed over the drives, below the best: the robust cubature filter's by window, start, share and width of
-what is wild, and the redesigned particle filter's, whose wavelet it shares, by window and alpha. `settings.Study` holds the best.
-The truth has no part in it.
+prints log-likelihoods, summed over the drives, relative to the best: the robust cubature filter's by window, start, share
+and width of the wild values, and the redesigned particle filter's, which has the same wavelet, by window and alpha.
+`settings.Study` holds the best. The truth is not used.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ from jaxveh.experiments.model_adaptive_pf.study import drives_of
 from jaxveh.sweeps import IN_MEMORY, Stores
 
 WINDOWS = (8, 16, 32, 64)
-"""Rows,"""
+"""Windows in rows."""
 
 STARTS = ((None, 1.0), (4, 1.0), (4, 4.0), (2, 16.0), (4, 16.0), (4, 64.0))
-"""how many of them first, None for all, and what holds until then, times the data sheet's variances;"""
+"""How many of the first rows (None: all of the window), and the variances until then, times the data sheet's."""
 
 SHARES = (0.01, 0.03, 0.1)
-"""of wild values,"""
+"""Shares of wild values."""
 
 FACTORS = (10.0, 30.0, 100.0)
-"""how many times as wide;"""
+"""How many times as wide wild values are."""
 
 ALPHAS = (1.1, 1.3, 1.5, 1.7, 1.9)
-"""and exponents of the stable law: 1 is Cauchy's, 2 the normal one's."""
+"""Exponents of the stable law: 1 is Cauchy's, 2 the normal one's."""
 
 
 def robust_likelihoods(
@@ -59,7 +59,7 @@ def robust_likelihoods(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> np.ndarray:
-    """Log-likelihoods (windows, starts, shares, factors, drives) of the robust cubature filter under the noise of 'both'."""
+    """Log-likelihoods (windows, starts, shares, factors, drives) of the robust cubature filter with the noise of 'both'."""
 
     def of(window, start):
         def run(study, car, drive, key, point):
@@ -92,7 +92,7 @@ def redesigned_likelihoods(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> np.ndarray:
-    """Log-likelihoods (windows, alphas, drives) of the redesigned particle filter under the noise of 'both'."""
+    """Log-likelihoods (windows, alphas, drives) of the redesigned particle filter with the noise of 'both'."""
 
     def of(window):
         def run(study, car, drive, key, point):
@@ -114,7 +114,7 @@ def _likelihoods(
     progress: Progress,
     stores: Stores,
 ) -> np.ndarray:
-    """(choices, *numbers, drives): of drives whose seed differs from the report's."""
+    """(choices, *numbers, drives), on drives whose seed differs from the report's."""
     seen = drives_of(study, {"both": CASES["both"]}, drives, jax.random.key(seed), stores=stores)
     car = model_car(study, fiala(study))
 

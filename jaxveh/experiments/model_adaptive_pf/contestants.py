@@ -1,4 +1,4 @@
-"""The estimators by name: what each believes of the motion, and of the sensors."""
+"""The estimators by name: their models of the motion and of the sensors."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ Run = Callable[[Study, TwoTrack3DOF, Drive, Any], Estimate]
 
 
 class Contestant(NamedTuple):
-    """`run(study, car, drive, key) -> Estimate`, with the car that the filter believes in; and what it is, in words."""
+    """`run(study, car, drive, key) -> Estimate`, with the car of the filter's model; and a description, `what`."""
 
     run: Run
     what: str
 
 
 def contestants(study: Study, lags: bool = True) -> dict[str, Contestant]:
-    """All of them by name, the do-nothing one first; with `lags` all but one know the tyres' relaxation length, else none does:
-    then their tyres' force is there at once."""
+    """All estimators by name, beginning with the one that does nothing. With `lags` all but one have the tyres' relaxation
+    length, otherwise none has: their tyre forces then follow without delay."""
     particles = filters.ParticleFilter(study.particles)
     wavelet = {"window": study.window, "forgetting": study.forgetting}
     haar = filters.HaarParticles(particles, **wavelet)
@@ -52,29 +52,29 @@ def contestants(study: Study, lags: bool = True) -> dict[str, Contestant]:
         "open loop": Contestant(_open_loop(lags), "the dynamics alone, from the first row on"),
         PLAIN: Contestant(on(particles), "the dynamics, the data sheet's Gaussian noise"),
         "PF, no relaxation": Contestant(
-            dynamics_filter(particles, lags=False), "the same on tyres whose force is there at once"
+            dynamics_filter(particles, lags=False), "the same on tyres whose force follows without delay"
         ),
         "AAR as printed": Contestant(regression_filter(printed), "autoregression, wavelet variance, mixture"),
         "AAR": Contestant(regression_filter(AutoRegressive(haar, study.update)), "the same with true least squares"),
         "PF, wavelet": Contestant(on(haar), "the dynamics, variances from the Haar wavelet"),
         "PF, mixture": Contestant(on(particles, mixture), "the dynamics, Cauchy-Gaussian likelihood"),
-        ADAPTIVE: Contestant(on(haar, mixture), "both, the variance that of the Gaussian part"),
+        ADAPTIVE: Contestant(on(haar, mixture), "both; the variance is that of the Gaussian part"),
         REDESIGNED: Contestant(
-            redesigned_particles(study, lags), "both parts follow the variance, of a short window with a wary start"
+            redesigned_particles(study, lags), "both parts follow the variance of a short window, large at the start"
         ),
         "strong tracking": Contestant(on(filters.StrongTracking(cubature)), "a cubature filter with a fading factor"),
         CUBATURE: Contestant(on(cubature), "the data sheet's Gaussian noise"),
         "Student-t CKF": Contestant(on(student), "Student's t law with the data sheet's scales"),
         STUDENT: Contestant(on(filters.HaarNoise(student, **wavelet)), "the same, scales from the Haar wavelet"),
         "robust CKF": Contestant(
-            on(contaminated_cubature(study)), "noise of which a share is wild, with the data sheet's scales"
+            on(contaminated_cubature(study)), "noise with a share of wild values, with the data sheet's scales"
         ),
         ROBUST: Contestant(
             on(filters.HaarNoise(contaminated_cubature(study), **wary(study))),
-            "the same, scales from the wavelet, as the redesigned PF's",
+            "the same, scales from the wavelet, as in the redesigned PF",
         ),
         TOLD: Contestant(
-            informed_filter(cubature, lags), "knows the truth: told each row's noise level, and which rows are wild"
+            informed_filter(cubature, lags), "is told the truth: each row's noise level, and which rows are wild"
         ),
     }
 
@@ -86,17 +86,17 @@ CUBATURE = "CKF"
 STUDENT = "Student-t CKF, wavelet"
 ROBUST = "robust CKF, wavelet"
 TOLD = "CKF, told the noise"
-"""A yardstick and no competitor: what it is worth to know what the others learn."""
+"""A reference and no competitor: the gain if a filter is told what the others have to learn."""
 
 JUDGED = (PLAIN, ADAPTIVE, REDESIGNED, CUBATURE, STUDENT, ROBUST)
-"""Those of which the criteria speak: the plain filter, what was asked about, and what was made later."""
+"""The estimators of the criteria: the plain filter, those asked about, and those made later."""
 
 WILD = 4.0
-"""Errors beyond so many standard deviations of their row are wild."""
+"""Errors beyond this many standard deviations of their row are wild."""
 
 
 def dynamics_filter(filter_, law=gaussian, lags: bool = True) -> Run:
-    """A filter of the dynamics; `lags`: that knows the tyres' relaxation length."""
+    """A filter of the dynamics; `lags`: with the tyres' relaxation length."""
 
     def run(study, car, drive, key):
         car = lagging_car(study, car) if lags else car
@@ -107,8 +107,8 @@ def dynamics_filter(filter_, law=gaussian, lags: bool = True) -> Run:
 
 
 def wary(study: Study) -> dict[str, Any]:
-    """The wavelet of the redesigned filters: a short window, used from its first rows on, and until then noise far above the data
-    sheet's."""
+    """The wavelet of the redesigned filters: a short window, used from its first rows on, and until then noise far above the
+    data sheet's."""
     return {
         "window": study.short_window,
         "forgetting": study.forgetting,
@@ -118,19 +118,19 @@ def wary(study: Study) -> dict[str, Any]:
 
 
 def contaminated_cubature(study: Study) -> filters.Contaminated:
-    """The cubature filter that knows that a share of what is measured is wild."""
+    """The cubature filter whose noise model has a share of wild measurements."""
     return filters.Contaminated(filters.Cubature(), study.wild_share, study.wild_factor)
 
 
 def redesigned_particles(study: Study, lags: bool = True) -> Run:
-    """The particle filter whose law follows the wavelet as a whole, from a window of its own, with tails of its own."""
+    """The particle filter whose noise law follows the wavelet as a whole, with its own window and tails."""
     law = lambda study: mixture(dataclasses.replace(study, alpha=study.heavy_alpha))
     haar = filters.HaarParticles(filters.ParticleFilter(study.particles), **wary(study), follows="both")
     return dynamics_filter(haar, law, lags)
 
 
 def informed_filter(filter_, lags: bool = True) -> Run:
-    """A filter of the dynamics that is told the noise's true level row by row, and to leave out what is wild."""
+    """A filter of the dynamics that is told the noise's true level in each row, and leaves out wild values."""
 
     def run(study, car, drive, key):
         names = {name: f"{name}_std" for name in study.stds}
@@ -169,11 +169,12 @@ def _open_loop(lags: bool) -> Run:
 
 
 EVERY = 5
-"""Rows between those that are kept of six states."""
+"""Rows between those of the six states that are kept."""
 
 
 def _slip_error(found: Estimate, drive: Drive) -> jax.Array:
-    """RMSE of `S = (r_e w - v_x) / v_x` (eq 7, with the car's own v_x) over all wheels; who knows of no spin says zero."""
+    """RMSE of `S = (r_e w - v_x) / v_x` (eq 7, with the car's own v_x) over all wheels; for a filter without spins S is
+    zero."""
     slip = lambda rims, v_x: rims / v_x[:, None] - 1.0
     true = slip(drive.true_rims, drive.true_v_x)
     said = jnp.zeros_like(true)
@@ -183,9 +184,9 @@ def _slip_error(found: Estimate, drive: Drive) -> jax.Array:
 
 
 def metrics(found: Estimate, drive: Drive) -> dict[str, Any]:
-    """Root mean squares over the drive of the errors of `sideslip` (degrees), `v_y` (m/s), `yaw_rate` (degrees/s), `v_x` (m/s),
-    `a_x` and `a_y` (m/s^2), and of the wheels' slips (%, where they spin; of other filters: of none); the sideslip over time
-    (rad), all six every `EVERY` rows, and the result's code."""
+    """Root mean square errors over the drive of `sideslip` (degrees), `v_y` (m/s), `yaw_rate` (degrees/s), `v_x` (m/s),
+    `a_x` and `a_y` (m/s^2), and of the wheels' slips (%; filters without spins count with slips of zero); the sideslip over
+    time (rad), all six states every `EVERY` rows, and the result's code."""
     rms = lambda name: jnp.sqrt(jnp.mean((getattr(found.mean, name) - getattr(drive, f"true_{name}")) ** 2))
     return {
         "sideslip": jnp.rad2deg(rms("sideslip")),
@@ -205,8 +206,8 @@ def metrics(found: Estimate, drive: Drive) -> dict[str, Any]:
 def of_a_point(
     study: Study, contestant: Contestant, tyre: Callable[..., AbstractTyre] = fiala
 ) -> Callable[[Any, Any, Any], dict[str, Any]]:
-    """The contestant's run of a design's point: `run(point, key, (case, drive))`, as `sweeps.sweep` calls it; `tyre(study,
-    share)` makes the filter's, `share` times as stiff and as strong."""
+    """The contestant's run at a design's point: `run(point, key, (case, drive))`, as `sweeps.sweep` calls it; `tyre(study,
+    share)` makes the filter's tyre, `share` times as stiff and as strong."""
 
     def run(point, key, data):
         del point

@@ -1,4 +1,4 @@
-"""The criteria: as they were asked, and what stands beside them."""
+"""The criteria as they were asked, and those that replace or repeat them."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from jaxveh.experiments.report import Terms
 
 
 class Question(NamedTuple):
-    """A criterion of sideslip in a `case`: the contestant that was `asked` about and the one that was made `later`, over that of
-    `other`, by the ratio of medians or, with `loses`, by the share of seeds that are lost to it; at most `bound`."""
+    """A criterion of sideslip in a `case`: the contestant that was `asked` about and the one that was made `later`, compared
+    with `other` by the ratio of medians or, with `loses`, by the share of seeds in which it loses; at most `bound`."""
 
     case: str
     asked: str
@@ -33,11 +33,11 @@ NOTHING, TOLD_LENGTH, WRONG_LENGTH = (
     "told the relaxation length",
     "told half or twice the length",
 )
-"""What all filters of a ratio know of the true tyres' relaxation."""
+"""The information of all filters of a ratio about the true tyres' relaxation."""
 
 
 class Asked(NamedTuple):
-    """A question of one `contestant`, with what all filters in it know of the relaxation length, `knows`."""
+    """A question about one `contestant`; `knows`: what all filters in it are told of the relaxation length."""
 
     question: Question
     contestant: str
@@ -53,18 +53,18 @@ class Asked(NamedTuple):
 
 _DRIVES = (
     "medians of sideslip RMSE on the report's drives; filters are told steer, torques, each tyre's true stiffness and friction "
-    "(their law is another) and the data sheet's noise"
+    "(their tyre law differs from the truth's) and the data sheet's noise"
 )
-_LATER = "; made after the asked one had missed 0.78 and 0.72, window, start and tails by likelihood on drives of a third key"
+_LATER = "; made after the asked one had missed 0.78 and 0.72; window, start and tails by likelihood on drives of a third key"
 _KNOWS = {
-    NOTHING: "; no filter knows of relaxation, as in the first run",
-    TOLD_LENGTH: "; all filters are told the true length, after the first run without had missed",
-    WRONG_LENGTH: "; all filters are told half of the true length, or twice: the worse of both",
+    NOTHING: "; no filter is told of relaxation, as in the first run",
+    TOLD_LENGTH: "; all filters are told the true length; added after the first run without it had missed",
+    WRONG_LENGTH: "; all filters are told half or twice the true length: the worse of both",
 }
 
 
 def _check_question(question: Question) -> list[Asked]:
-    """As it was asked, and what stands beside it."""
+    """The question as it was asked, and those that replace or repeat it."""
     knows = (NOTHING, WRONG_LENGTH, TOLD_LENGTH)
     return [Asked(question, who, what) for who in (question.asked, question.later) for what in knows]
 
@@ -77,4 +77,4 @@ def _terms(one: Asked, first: Asked) -> Terms:
 ASKED = tuple(one for question in QUESTIONS for one in _check_question(question))
 
 CRITERIA = {one.name: _terms(one, _check_question(one.question)[0]) for one in ASKED}
-"""The criteria by name; those that stand beside one as it was asked follow it."""
+"""The criteria by name; those that replace or repeat another follow it."""

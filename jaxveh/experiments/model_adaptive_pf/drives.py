@@ -1,4 +1,4 @@
-"""The drives: a slalom of a car of seven degrees of freedom, and sensors whose noise is not what their data sheet says."""
+"""The drives: a slalom of a car of seven degrees of freedom, and sensors whose noise differs from their data sheet."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ START = 1.0
 
 
 HARMONICS = 20
-"""Of which slopes are made."""
+"""Number of harmonics of the slopes."""
 
 WHEELS = ("fl", "fr", "rl", "rr")
-"""In the order of the rims."""
+"""The order of the rims."""
 
 
 class Drive(NamedTuple):
-    """What filters may see, (T,) each, and the truth.
+    """The channels that filters may use, (T,) each, and the truth.
 
-    `steer` (rad), `drive_torque`, `brake_torque` (N m) exact; `v_x` (m/s), `a_y` (m/s^2), `yaw_rate` (rad/s) measured, and the
-    noise's `level` over the data sheet's; `true_v_x`, `true_v_y` (m/s), `true_yaw_rate`, `true_a_y`, `true_sideslip` (rad),
-    `true_a_x` (m/s^2). `rims` (m/s, (T, 4)): each wheel's spin times its radius as measured, and `true_rims`; NaN of a truth
-    whose wheels do not spin.
+    `steer` (rad), `drive_torque`, `brake_torque` (N m) are exact; `v_x` (m/s), `a_y` (m/s^2), `yaw_rate` (rad/s) are
+    measured; `level`: the noise's level over the data sheet's; `true_v_x`, `true_v_y` (m/s), `true_yaw_rate`, `true_a_y`,
+    `true_sideslip` (rad), `true_a_x` (m/s^2). `rims` (m/s, (T, 4)): each wheel's spin times its radius as measured, and
+    `true_rims`; NaN if the truth has no wheel spins.
     """
 
     steer: Any
@@ -93,19 +93,19 @@ def fiala(study: Study, tyre=1.0, **changes) -> AbstractTyre:
 
 
 def spinning_car(study: Study, tyre: AbstractTyre) -> SevenDOF:
-    """The paper's own car of a filter: seven degrees of freedom on these tyres."""
+    """The paper's own car as a filter's model: seven degrees of freedom on these tyres."""
     return vehicles.build(numbers_of(study), SevenDOF, front=tyre, rear=tyre, load_transfer=QuasiStatic())
 
 
 def model_car(study: Study, tyre: AbstractTyre) -> TwoTrack3DOF:
-    """What a filter knows: the same car on these tyres, its spins and load transfer following at once."""
+    """The car of the filters' models: the same car on these tyres, with spins and load transfer that follow without delay."""
     return vehicles.build(
         numbers_of(study), TwoTrack3DOF, front=tyre, rear=tyre, load_transfer=QuasiStatic(), grip=study.friction
     )
 
 
 def drive_once(study: Study, case: Case, key) -> Drive:
-    """One drive of a case; a pure function, for `vmap`. Cases of one key differ in nothing but what the case says."""
+    """One drive of a case; a pure function, for `vmap`. Cases of one key differ only in their settings."""
     driver_key, sensor_key, road_key = jax.random.split(key, 3)
     speed, steer = jax.random.normal(driver_key, (2,))
     manoeuvre = manoeuvres.slalom(
@@ -140,8 +140,8 @@ def _rims(study: Study, found: Recording) -> jax.Array:
 
 
 def road_of(study: Study, case: Case, key) -> roads.RandomRoad:
-    """A road whose bank and grade nobody knows."""
-    # A level road is one so nearly level that no filter notices: a spread of zero is none.
+    """A road whose bank and grade no filter is told."""
+    # A level road is so nearly level that no filter notices: a standard deviation of zero is not allowed.
     std = study.slope * jnp.maximum(case.slope, 1e-6)
     make = lambda k: roads.gauss_markov(std, study.slope_length, k, count=HARMONICS)
     bank_key, grade_key = jax.random.split(key)

@@ -1,4 +1,4 @@
-"""The study's pictures: one drive's sideslip, who errs by how much, where the gain is, and the printed tyre."""
+"""The study's figures: one drive's sideslip, the errors of all estimators, where the gain is, and the printed tyre."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SHOWN = {
 
 
 def figures(result: Reproduction) -> dict[str, Any]:
-    """All of them by file stem."""
+    """All figures by file stem."""
     raced = result.raced
     return {
         "measured": measured_figure(raced),
@@ -48,7 +48,7 @@ def _drive(raced: Raced, case: str, seed: int) -> Drive:
 
 
 def measured_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any = None) -> Any:
-    """What the sensors say on one drive, and the truth."""
+    """The sensors' measurements on one drive, and the truth."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 4.6), layout="constrained") if figure is None else figure
     drive, t = _drive(raced, case, seed), np.asarray(times(raced.study))
     channels = {"v_x": ("v_x [m/s]", 1.0), "a_y": ("a_y [m/s²]", 1.0), "yaw_rate": ("yaw rate [°/s]", 180.0 / np.pi)}
@@ -61,17 +61,17 @@ def measured_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any
             axes.fill_between(t, truth - band, truth + band, color="#e8dfc2", linewidth=0, label="noise, one std")
             axes.plot(t, said, ".", color=kit.CYCLE[0], markersize=1.5, label="measured")
             axes.plot(t, truth, color=COLOURS["truth"], label="truth")
-            # Outliers leave the picture.
+            # Outliers may leave the figure.
             reach = np.max(np.abs(truth - truth.mean())) + 20.0 * std
             axes.set(ylabel=label, ylim=(truth.mean() - reach, truth.mean() + reach))
         panels[-1].set(xlabel="time [s]")
-        panels[0].set_title(f"One drive of '{case}': noise that rises, and 3 % outliers, most outside the picture")
+        panels[0].set_title(f"One drive of '{case}': noise that rises, and 3 % outliers, most outside the figure")
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper left", ncols=3)
     return figure
 
 
 def sideslip_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any = None) -> Any:
-    """Sideslip of one drive as estimated, and the errors below, as the paper's figure 4."""
+    """Sideslip of one drive as estimated, and the errors below, as in the paper's figure 4."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 4.6), layout="constrained") if figure is None else figure
     drive, t = _drive(raced, case, seed), np.asarray(times(raced.study))
     with style():
@@ -83,7 +83,7 @@ def sideslip_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any
             above.plot(t, found, color=colour, label=name)
             below.plot(t, found - truth, color=colour)
         above.set(ylabel="sideslip [°]", title=f"One drive of '{case}'")
-        # What outliers do to the cubature filter leaves the picture.
+        # The cubature filter's errors after outliers may leave the figure.
         above.set(ylim=(1.8 * truth.min(), 1.8 * truth.max()))
         below.set(xlabel="time [s]", ylabel="error [°]", ylim=(-1.0, 1.0))
         figure.legend(loc="outside upper left", ncols=3)
@@ -108,7 +108,7 @@ def six_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any = No
                 course = unit * raced.of("six", one, case)[seed, SIX.index(name)]
                 axes.plot(t[::EVERY], course, color=colour, label=one)
             axes.plot(t, truth, color=COLOURS["truth"], label="truth", linestyle="--")
-            # What outliers do to a filter that knows of none leaves the picture.
+            # Errors after outliers may leave the figure, for a filter without a model of them.
             reach = 1.5 * np.max(np.abs(truth - truth.mean()))
             axes.set(ylabel=label, ylim=(truth.mean() - reach, truth.mean() + reach))
         for axes in every[-1]:
@@ -120,7 +120,7 @@ def six_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any = No
 
 
 def ablation_figure(raced: Raced, figure: Any = None) -> Any:
-    """Sideslip RMSE of every estimator, median and quartiles, under each kind of noise."""
+    """Sideslip RMSE of every estimator, median and quartiles, with each kind of noise."""
     names = raced.found.design.axis("estimator").labels
     figure = (
         kit.Figure(figsize=(kit.PAGE_WIDTH, 0.32 * len(names) + 1.2), layout="constrained")
@@ -141,7 +141,7 @@ def ablation_figure(raced: Raced, figure: Any = None) -> Any:
         best = min(float(np.min(raced.of("sideslip", name, case))) for name in names for case in CASES)
         axes.set(
             xlabel="sideslip RMSE [°], median and quartiles over seeds", xlim=(0.8 * best, 2.5),
-            title="Who errs by how much; what is lost lies outside the picture",
+            title="Errors of all estimators; lost runs lie outside the figure",
         )  # fmt: skip
         figure.legend(loc="outside upper left", ncols=4)
     return figure
@@ -173,7 +173,7 @@ def gain_figure(raced: Raced, figure: Any = None) -> Any:
 
 
 def pressed_figure(raced: Raced, figure: Any = None) -> Any:
-    """Sideslip RMSE over the process noise that filters assume: medians and quartiles."""
+    """Sideslip RMSE over the process noise of the filters' models: medians and quartiles."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.4), layout="constrained") if figure is None else figure
     shares = [case.process for case in raced.cases.values()]
     with style():

@@ -1,4 +1,4 @@
-"""What filters believe: the body's three states on Fiala tyres, moved by the dynamics or by an autoregression."""
+"""The filters' models: the body's three states on Fiala tyres, moved by the dynamics or by an autoregression."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ from jaxveh.vehicles import SevenDOF, TwoTrack3DOF
 INPUTS = ("steer", "drive_torque", "brake_torque")
 
 SPREAD = {"v_y": 0.2, "yaw_rate": 0.02}
-"""The prior's, m/s and rad/s, about straight running."""
+"""The prior's standard deviations, m/s and rad/s, about straight running."""
 
 
 DEFLECTION = 0.002
-"""The prior's spread of a tyre's deflection, m: a third of a degree of slip."""
+"""The prior's standard deviation of a tyre's deflection, m: a third of a degree of slip."""
 
 
 SIX = ("v_x", "v_y", "yaw_rate", "sideslip", "a_x", "a_y")
-"""What is reported: m/s, m/s, rad/s, rad, m/s^2, m/s^2."""
+"""The reported quantities: m/s, m/s, rad/s, rad, m/s^2, m/s^2."""
 
 RIMS = tuple(f"rim_{at}" for at in WHEELS)
 """Channels of the filters of seven degrees of freedom, m/s."""
@@ -53,7 +53,7 @@ class BodyState(NamedTuple):
 
 
 class Regressed(NamedTuple):
-    """A car, and what each state keeps from row to row (-): the autoregression's coefficients."""
+    """A car, and the share that each state keeps from row to row (-): the autoregression's coefficients."""
 
     car: TwoTrack3DOF
     keeps: BodyState
@@ -62,10 +62,10 @@ class Regressed(NamedTuple):
 def dynamics(
     study: Study, car: TwoTrack3DOF, start_speed, law: AbstractNoise | None = None, more: tuple[str, ...] = ()
 ) -> StateSpace:
-    """The car's equations of motion with wheel torques and steer as inputs; `start_speed` m/s, the first that was measured;
-    `more` inputs of which the car knows nothing.
+    """The car's equations of motion with wheel torques and steer as inputs; `start_speed`: the first measured speed, m/s;
+    `more`: inputs that the car does not use.
 
-    Deflections of the tyres, where they have such, are states, too, without noise of their own.
+    The tyres' deflections, if they have any, are further states, without noise of their own.
     """
     noise = {"v_x": study.v_x_noise, "v_y": study.v_y_noise, "yaw_rate": study.yaw_noise}
     return StateSpace(
@@ -83,9 +83,9 @@ def lagging_car(study: Study, car: TwoTrack3DOF) -> TwoTrack3DOF:
 
 
 def autoregression(study: Study, car: TwoTrack3DOF, start_speed, law: AbstractNoise) -> StateSpace:
-    """Eq 25 with p = 1 in the place of the equations of motion: each state keeps a share of its last value, and walks.
+    """Eq 25 with p = 1 in place of the equations of motion: each state keeps a share of its last value, and walks.
 
-    What sensors say is still the car's: of the lateral acceleration the tyres' force.
+    The measurements are still those of the car: for the lateral acceleration the tyres' force.
     """
     noise = {"v_x": study.walk_v_x, "v_y": study.walk_v_y, "yaw_rate": study.walk_yaw}
     one = jnp.ones_like(start_speed)
@@ -97,8 +97,8 @@ def autoregression(study: Study, car: TwoTrack3DOF, start_speed, law: AbstractNo
 
 
 class MatrixRegressed(NamedTuple):
-    """A car, and of the autoregression `own` (3 by 3, -, m/s, m/s, rad/s): what a row's state makes of the last one, and
-    `offset`: what rows before that add, a state."""
+    """A car, and the autoregression: `own` (3 by 3, -, m/s, m/s, rad/s) maps the last row's state to this row's, and
+    `offset`, a state, is the contribution of earlier rows."""
 
     car: TwoTrack3DOF
     own: Any
@@ -106,7 +106,7 @@ class MatrixRegressed(NamedTuple):
 
 
 def matrix_autoregression(study: Study, car: TwoTrack3DOF, start_speed, law: AbstractNoise) -> StateSpace:
-    """Eq 25 with a matrix: `x_t = A_1 x_(t-1) + A_2 X_(t-2) + ... + u`, rows before the last as the filter's means had them."""
+    """Eq 25 with a matrix: `x_t = A_1 x_(t-1) + A_2 X_(t-2) + ... + u`; rows before the last are the filter's means."""
     plain = autoregression(study, car, start_speed, law)
     zero = jnp.zeros_like(start_speed)
     system = MatrixRegressed(car, jnp.eye(3, dtype=zero.dtype), BodyState(zero, zero, zero))
@@ -119,7 +119,7 @@ def matrix_autoregression(study: Study, car: TwoTrack3DOF, start_speed, law: Abs
 def spinning_model(study: Study, car: SevenDOF, start_speed) -> StateSpace:
     """The paper's seven degrees of freedom (eqs 1 to 8): the wheels' spins are states, and their rims' speeds are measured.
 
-    The spins' poles are some 400 1/s at 50 km/h: two steps of Runge-Kutta in a row of 0.01 s. No tyre relaxes.
+    The spins' poles are some 400 1/s at 50 km/h: two steps of Runge-Kutta in a row of 0.01 s. The tyres do not relax.
     """
     body = {"v_x": study.v_x_noise, "v_y": study.v_y_noise, "yaw_rate": study.yaw_noise}
     spins = [name for name in car.state_type._fields if name.startswith("omega")]
@@ -135,8 +135,8 @@ def spinning_model(study: Study, car: SevenDOF, start_speed) -> StateSpace:
 
 
 def heavy_dynamics(study: Study, car: TwoTrack3DOF, start_speed) -> StateSpace:
-    """`dynamics` whose process noise is the alpha-stable mixture of eqs 12 to 14, too, as the paper claims it may be: of a row's
-    length the same Gaussian part, and Cauchy tails."""
+    """`dynamics` whose process noise, too, is the alpha-stable mixture of eqs 12 to 14, which the paper says is possible:
+    per row the same Gaussian part, and Cauchy tails."""
     plain = dynamics(study, car, start_speed)
     stds = {"v_x": study.v_x_noise, "v_y": study.v_y_noise, "yaw_rate": study.yaw_noise}
     stds = {name: std * study.dt**0.5 for name, std in stds.items()}
@@ -145,7 +145,7 @@ def heavy_dynamics(study: Study, car: TwoTrack3DOF, start_speed) -> StateSpace:
 
 
 def prior(study: Study, start_speed, lags: tuple[str, ...] = ()) -> Prior:
-    """Straight running at the first speed that was measured."""
+    """Straight running at the first measured speed."""
     zero = 0.0 * start_speed
     spread = {"v_x": 2.0 * study.v_x, **SPREAD, **dict.fromkeys(lags, DEFLECTION)}
     kind = record_type("MovedState", spread) if lags else BodyState
@@ -171,7 +171,7 @@ def rows_of(study: Study, drive: Drive) -> Row:
 
 
 def spinning_rows_of(study: Study, drive: Drive) -> Row:
-    """The same with the speeds of the rims."""
+    """The drive as rows with the speeds of the rims."""
     rows = rows_of(study, drive)
     y = record_type("SpinningMeasurements", (*study.stds, *RIMS))(
         *rows.y, *(drive.rims[:, i] for i in range(len(RIMS)))
@@ -180,7 +180,7 @@ def spinning_rows_of(study: Study, drive: Drive) -> Row:
 
 
 def _whole(car: TwoTrack3DOF | SevenDOF, x: Any):
-    """The car's state; of its yaw nothing depends."""
+    """The car's state with a yaw of zero, on which nothing depends."""
     return car.state_type(**{"yaw": 0.0 * x.yaw_rate, **x._asdict()})
 
 

@@ -1,4 +1,4 @@
-"""The paper's equations to the letter, errata included, and what they do."""
+"""The paper's equations to the letter, errata included, and their results."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ SHOWN = {"constant": CASES["constant"], "both": CASES["both"], "both, 5 degrees 
 class PrintedNoise(AbstractWrapper):
     """The filter of `inner`, for a mixture whose Gaussian part follows eqs 15 and 16 as printed.
 
-    `delta = median |d| / 0.627`, then `R = 0.9 R + 0.1 delta`: a standard deviation is mixed into a variance, so that R ends at
-    delta, which is 200 times a variance of 0.005^2. `density="eq 14"` takes eq 14 to the letter, `exp(-x^2 / (4 R^2))`, whose
-    standard deviation is `sqrt(2) R`: of an R that is a variance that is far too sharp, of one that has become a standard
-    deviation 1.5 times too wide. `density="variance"` takes R for the variance that it is called.
+    `delta = median |d| / 0.627`, then `R = 0.9 R + 0.1 delta`: a standard deviation is mixed into a variance, so R ends at
+    delta, which is 200 times a variance of 0.005^2. `density="eq 14"` takes eq 14 to the letter, `exp(-x^2 / (4 R^2))`,
+    whose standard deviation is `sqrt(2) R`: far too small if R is a variance, and 1.5 times too large if R has become a
+    standard deviation. `density="variance"` treats R as the variance that it is called.
     """
 
     inner: filters.HaarParticles
@@ -107,7 +107,7 @@ def as_printed(
 
 
 def entrants(study: Study) -> dict[str, Contestant]:
-    """The plain and the corrected filter, and the paper's equations; none knows the tyres' relaxation, as the paper has it."""
+    """The plain and the corrected filter, and the paper's equations; none has the tyres' relaxation, as in the paper."""
     particles = filters.ParticleFilter(study.particles)
     haar = filters.HaarParticles(particles, study.window, study.forgetting)
     literal, variance = PrintedNoise(haar), PrintedNoise(haar, "variance")
@@ -119,11 +119,11 @@ def entrants(study: Study) -> dict[str, Contestant]:
             dynamics_filter(haar, mixture, lags=False), "wavelet variance and mixture, errata corrected"
         ),
         "eqs 15 and 16": Contestant(
-            dynamics_filter(variance, mixture, lags=False), "the same, R of eq 16 taken for a variance"
+            dynamics_filter(variance, mixture, lags=False), "the same, R of eq 16 as a variance"
         ),
         "eqs 14 to 16": Contestant(dynamics_filter(literal, mixture, lags=False), "the density of eq 14 as well"),
         "eqs 14 to 25": Contestant(
-            regression_filter(whole), "the paper: these, and the autoregression of eqs 22 to 25"
+            regression_filter(whole), "the paper's filter: these, and the autoregression of eqs 22 to 25"
         ),
     }
 
@@ -156,7 +156,7 @@ def _tyre_race(raced: Raced, own: Raced) -> Table:
 
 
 def tyre_table(study: Study) -> Table:
-    """Where the printed tyre jumps, under the load of a front wheel."""
+    """Where the printed tyre has steps, with the load of a front wheel."""
     load = numbers_of(study).wheel_loads()[0]
     limit = study.friction * load
     rows = []

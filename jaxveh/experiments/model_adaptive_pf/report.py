@@ -1,4 +1,4 @@
-"""The report: an ablation, what an error of the tyre does, and the criteria."""
+"""The report: an ablation, the effect of an error of the tyre, and the criteria."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ ERRORS = {"sideslip": "sideslip, degrees", "v_y": "v_y, m/s", "yaw_rate": "yaw r
 
 
 PRESSED = ("open loop", PLAIN, REDESIGNED, ROBUST, TOLD)
-"""Who is tried with every process noise."""
+"""The estimators that run with every process noise."""
 
 DENSITIES = (PLAIN, REDESIGNED, ROBUST)
-"""Of these, whose likelihood is one of the same data: who is told leaves rows out."""
+"""Those of them whose likelihoods use the same data: the one that is told the noise leaves rows out."""
 
 
 class Reproduction(NamedTuple):
-    """Everything the experiment found: `raced`, every case and estimator; `pressed`, some by their process noise; of those that
-    the criteria speak of: on tyres without relaxation, `unaware`, and told half or twice its length, `misled`; what the
-    paper has beside, `beside`, and at 30 km/h and on a loose road, `slow`."""
+    """All results of the experiment: `raced`, every case and estimator; `pressed`, some estimators by their process noise;
+    the estimators of the criteria on tyres without relaxation, `unaware`, and told half or twice its length, `misled`;
+    further parts of the paper, `beside`; and runs at 30 km/h and on a loose road, `slow`."""
 
     seeds: int
     raced: Raced
@@ -59,7 +59,7 @@ def run(
 ) -> Reproduction:
     """All drives and estimators over `seeds` seeds (at least two)."""
     study = study or Study()
-    # Other drives than those on which the noises were chosen, whose key was another.
+    # Other drives than those on which the noises were chosen, which had another key.
     drive_key, filter_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 1))
     cases = {**CASES, **LIMIT, **SLOW}
     drives = drives_of(study, cases, seeds, drive_key, progress=part(progress, 0.0, 0.15, "drives"), stores=stores)
@@ -69,7 +69,7 @@ def run(
     first = lambda *names: jax.tree.map(lambda leaf: leaf[:, :FEW], on(*names))
     beside = race(
         study, SWERVE, first(*SWERVE), filter_key, entrants=entrants(study),
-        progress=part(progress, 0.6, 0.65, "what the paper has beside"), stores=stores.under("beside"),
+        progress=part(progress, 0.6, 0.65, "further parts of the paper"), stores=stores.under("beside"),
     )  # fmt: skip
     slow = race(
         study, SLOW, first(*SLOW), filter_key, only=SLOWLY, progress=part(progress, 0.65, 0.7, "30 km/h"),
@@ -99,23 +99,23 @@ def _drives_on(drives: Drive, cases: dict[str, Any], names: tuple[str, ...]) -> 
 
 
 def against(raced: Raced, case: str, estimator: str, other: str = PLAIN, error: str = "sideslip") -> Comparison:
-    """An estimator's errors beside another's, seed by seed."""
+    """An estimator's errors compared with another's, seed by seed."""
     return compare(raced.of(error, estimator, case), raced.of(error, other, case))
 
 
 def check(result: Reproduction) -> list[Check]:
     """The criteria, each with its condition (`criteria`).
 
-    That the error was made before the wavelet knew the noise, was found on drives of another key; what is done about it was
-    chosen by likelihood on those of a third (`choice`). Drives differ: over 40 of the other key the redesigned filter, told the
-    relaxation length, errs 0.78 times as much as the plain one and the robust one 0.75 times, where a cubature filter that is
-    told the noise ends at 0.73 (on the report's drives 0.68).
+    That the error was made before the wavelet had the noise level was found on drives of another key; the remedy was chosen
+    by likelihood on those of a third (`choice`). Drives differ: over 40 of the other key the redesigned filter, told the
+    relaxation length, has 0.78 times the error of the plain one and the robust one 0.75 times, while a cubature filter that
+    is told the noise reaches 0.73 (on the report's drives 0.68).
     """
     return with_terms([at_most(one.name, value_of(result, one), one.question.bound) for one in ASKED], CRITERIA)
 
 
 def value_of(result: Reproduction, one: Asked) -> float:
-    """A criterion's number: of two wrong lengths the worse."""
+    """A criterion's number; with two wrong lengths the worse one."""
     case, _, _, other, _, loses = one.question
     if one.knows == TOLD_LENGTH:
         there = [(result.raced, case)]
@@ -128,7 +128,7 @@ def value_of(result: Reproduction, one: Asked) -> float:
 
 
 def tables(result: Reproduction) -> list[Table]:
-    """The tables, the do-nothing open loop in each."""
+    """The tables; each contains the open loop, which does nothing."""
     raced = result.raced
     return [
         _ablation(raced, "both"),
@@ -141,7 +141,7 @@ def tables(result: Reproduction) -> list[Table]:
         _knowledge(result, "constant"),
         _noise_table(result.pressed),
         _absolute(raced, LIMIT, "Near the limit, noise as in 'both': sideslip RMSE in degrees, by the filter's tyre"),
-        _ratios(raced, LIMIT, "The same over the plain particle filter's: where the model errs, it rules"),
+        _ratios(raced, LIMIT, "The same over the plain particle filter's: an error of the model dominates"),
     ]
 
 
@@ -192,7 +192,7 @@ def _absolute(raced: Raced, cases, title: str) -> Table:
 
 
 def _knowledge(result: Reproduction, case: str) -> Table:
-    """Errors by what filters know of the relaxation length."""
+    """Errors by what filters are told of the relaxation length."""
     there = {
         "nothing": (result.unaware, case),
         "half of it": (result.misled, f"{case}, half"),
@@ -205,8 +205,8 @@ def _knowledge(result: Reproduction, case: str) -> Table:
         ratios = [float(against(raced, where, name).of_medians.value) for raced, where in there.values()]
         rows.append((name, *cells, *ratios))
     return Table(
-        f"Scenario '{case}' by what all filters know of the tyres' relaxation length: sideslip RMSE, degrees; and medians over "
-        f"the {PLAIN}'s that knows as much",
+        f"Scenario '{case}' by what all filters are told of the tyres' relaxation length: sideslip RMSE, degrees; and medians "
+        f"over those of the {PLAIN} that is told the same",
         ("estimator", *there, *[f"over {PLAIN}: {what}" for what in there]),
         rows,
     )
@@ -219,15 +219,15 @@ def _noise_table(raced: Raced) -> Table:
         chosen = likeliest(raced, name) if name in DENSITIES else "-"
         rows.append((name, *errors, chosen))
     return Table(
-        "Scenario 'both' by the process noise, over that of the other tables: sideslip RMSE, degrees; and the one that each "
-        "would choose on these drives by its own likelihood",
+        "Scenario 'both' by the process noise, over that of the other tables: sideslip RMSE, degrees; and the process noise that "
+        "each would choose on these drives by its own likelihood",
         ("estimator", *raced.cases, "its own choice"),
         rows,
     )
 
 
 def likeliest(raced: Raced, estimator: str) -> str:
-    """The case under which the estimator's likelihood, all drives together, is greatest; a drive that is lost has none."""
+    """The case with the greatest likelihood of the estimator, summed over all drives; a lost drive has none."""
 
     def total(case: str) -> float:
         values = raced.of("log_likelihood", estimator, case)

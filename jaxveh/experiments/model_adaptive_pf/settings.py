@@ -1,4 +1,4 @@
-"""What the paper prints, and what the study assumes where it is silent."""
+"""The printed settings of the paper, and the assumptions of the study where the paper gives none."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ CITATION = """@article{qin2014model,
 }"""
 
 PRINTED_SLIP_STIFFNESS = 1200.0
-"""C_s, N (printed as N/m): a slip of 1 would push a wheel with as much as 38 % of its front load."""
+"""C_s, N (printed as N/m): a slip of 1 would give a wheel a force of only 38 % of its front load."""
 
 PRINTED_CONTACT_LENGTH = 0.070
 """L_r, m."""
 
 PRINTED_DIVISOR = 0.627
-"""Of eq 15, where the median of a normal number's magnitude is 0.6745."""
+"""Divisor of eq 15; the median of a normal number's magnitude is 0.6745."""
 
 
 class Case(NamedTuple):
     """One scenario: peak `steer` (degrees at the road wheels), the `level` that the noise rises to (times the data sheet's),
     the share of `outliers`, the filter's `tyre` over the true one (stiffness and friction), the road's `slope` over the
     study's, the `process` noise of the dynamics over the study's, and the `relaxation` length that filters are told over the
-    true one; the `speed` over the study's; the road's `friction`, and what filters are `told` of it."""
+    true one; the `speed` over the study's; the road's `friction`, and the friction that filters are `told`."""
 
     steer: float = 3.0
     level: float = 1.0
@@ -44,38 +44,39 @@ class Case(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Study:
-    """The paper's slalom, and who estimates on it. Truth: seven degrees of freedom on Magic Formula tyres with relaxation.
+    """The paper's slalom, and its estimators. Truth: seven degrees of freedom on Magic Formula tyres with relaxation.
 
     The car (printed, Table 1): `mass` kg, `yaw_inertia` kg m^2, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height`,
-    `track_front`, `track_rear`, `wheel_radius` m; `cornering_stiffness` (N/rad), `friction` (-) and `trail` (m) of each tyre.
-    `relaxation` (m): what the true tyres' own data say of their relaxation length under their static loads. Filters were told it
-    after a first run over 20 seeds without, in which two checks failed, further from their bounds: so every criterion is asked
-    of filters that know of no relaxation, and beside it of those that are told its length, right or wrong by a factor of two.
-    Ours:
-    `wheel_inertia` kg m^2, `drag` N s^2/m^2, `rolling_resistance` (-), `slip_stiffness` N (the printed one is unusable).
+    `track_front`, `track_rear`, `wheel_radius` m; `cornering_stiffness` (N/rad), `friction` (-) and `trail` (m) of each
+    tyre. `relaxation` (m): the relaxation length of the true tyres' own data under their static loads. Filters were told it
+    only after a first run over 20 seeds without it, in which two checks failed and were further from their bounds. Every
+    criterion is therefore asked of filters that are told of no relaxation, and repeated with filters that are told its
+    length, right or wrong by a factor of two. Ours: `wheel_inertia` kg m^2, `drag` N s^2/m^2, `rolling_resistance` (-),
+    `slip_stiffness` N (the printed one is unusable).
 
-    The drive: `duration` s, rows every `dt` s (printed), `max_step` s of the simulation; `speed` m/s, `periods` of steer with
-    `frequency` Hz. Each seed has its own speed and peak steer, spread by `speed_spread` and `steer_spread` (shares), and its own
-    uneven road (the paper's real car ran on a sloping sandy one): bank and grade of `slope` rad over `slope_length` m.
+    The drive: `duration` s, rows every `dt` s (printed), `max_step` s of the simulation; `speed` m/s, `periods` of steer
+    with `frequency` Hz. Each seed has its own speed and peak steer, with standard deviations `speed_spread` and
+    `steer_spread` (shares), and its own uneven road (the paper's real car drove on a sloping sandy one): bank and grade of
+    `slope` rad over `slope_length` m.
 
     Sensors: standard deviations `v_x` m/s, `a_y` m/s^2, `yaw_rate` rad/s of the data sheet, those of `sensors.esc()`, and of
-    wheel speeds at the `rim` (m/s), for the filters of seven degrees of freedom alone, whose spins walk by `spin_noise` (rad/s
-    per root second; ours, as much as `v_x_noise` at the rim, and chosen by nobody); where the
-    noise varies it rises to a multiple and falls again within `level_period` s, to 0.8 m/s^2 and 2.3 degrees/s as on an unpaved
-    road. An outlier is a normal number of `outlier_size` times the data sheet's standard deviation, added: of the size of the
-    sensors' range, 10 m/s^2 and 29 degrees/s, which makes the fixed-R cubature filter four to five times worse than the
-    plain particle filter, as in first measurements of this scenario.
+    wheel speeds at the `rim` (m/s), only for the filters of seven degrees of freedom, whose spins walk by `spin_noise`
+    (rad/s per root second; ours, as large as `v_x_noise` at the rim, and not optimised). Noise that varies rises to a
+    multiple and falls again within `level_period` s, to 0.8 m/s^2 and 2.3 degrees/s as on an unpaved road. An outlier is a
+    normal number of `outlier_size` times the data sheet's standard deviation, added: about the sensors' range, 10 m/s^2 and
+    29 degrees/s, which makes the fixed-R cubature filter four to five times worse than the plain particle filter, as in
+    first measurements of this scenario.
 
-    Filters: `particles`, `alpha` of the noise law, `window` (printed) and `forgetting` of the wavelet's variance, `update` U_c of
-    the autoregression, `dof` of Student's t law. Of the redesigned filters: the wavelet's `short_window`, used from its `fewest`
-    rows on, and how many times the data sheet's variances hold until then, `initial`; the robust cubature filter's share of
+    Filters: `particles`, `alpha` of the noise law, `window` (printed) and `forgetting` of the wavelet's variance, `update`
+    U_c of the autoregression, `dof` of Student's t law. Of the redesigned filters: the wavelet's `short_window`, used from
+    its `fewest` rows on; `initial`: the variances until then, times the data sheet's; the robust cubature filter's share of
     wild values, `wild_share`, `wild_factor` times as wide; the particle filter's tails, `heavy_alpha`: those of the greatest
-    likelihood on drives of another key with the noise of 'both' (`choice`). Process noise per root second:
-    `v_x_noise`, `v_y_noise` (m/s), `yaw_noise` (rad/s), and of a step of the autoregression `walk_v_x`, `walk_v_y` (m/s),
-    `walk_yaw` (rad/s): those of the greatest likelihood on grids of factor two, on constant noise, drives of other keys with 3
-    and 5 degrees of steer, and for the dynamics tyres that are right, 15 % too weak and 15 % too strong: of the cubature filter,
-    of the plain particle filter (without relaxation, where both agree) and of the autoregression with a Gaussian likelihood. The
-    truth has no part in them.
+    likelihood on drives of another key with the noise of 'both' (`choice`). Process noise per root second: `v_x_noise`,
+    `v_y_noise` (m/s), `yaw_noise` (rad/s), and per step of the autoregression `walk_v_x`, `walk_v_y` (m/s), `walk_yaw`
+    (rad/s): those of the greatest likelihood on grids of factor two, with constant noise, on drives of other keys with 3 and
+    5 degrees of steer, for the dynamics also over tyres that are right, 15 % too weak and 15 % too strong: of the cubature
+    filter, of the plain particle filter (without relaxation, where both agree) and of the autoregression with a Gaussian
+    likelihood. The truth is not used.
     """
 
     mass: float = 1528.0
@@ -150,25 +151,25 @@ CASES = {
     "outliers": Case(outliers=0.03),
     "both": Case(level=8.0, outliers=0.03),
 }
-"""Measurement noise as the data sheet says, rising and falling again, with 3 % outliers, with both."""
+"""Measurement noise according to the data sheet, rising and falling again, with 3 % outliers, with both."""
 
 PROCESS = {f"x {share:g}": Case(level=8.0, outliers=0.03, process=share) for share in (0.5, 1.0, 2.0, 4.0)}
-"""What the gain rests on: the drives of 'both' by the process noise that filters assume, over the one that drives with clean
-sensors chose. The autoregression needs 2.5 times as much, and the paper has one u for both."""
+"""The basis of the gain: the drives of 'both' by the process noise of the filters' models, over the one chosen on drives
+with clean sensors. The autoregression needs 2.5 times as much, and the paper has one u for both."""
 
 WRONG_LENGTHS = {
     f"{case}, {what}": CASES[case]._replace(relaxation=share)
     for case in ("constant", "both")
     for what, share in (("half", 0.5), ("double", 2.0))
 }
-"""The drives of two cases, of which filters are told half or twice the relaxation length."""
+"""The drives of two cases, with filters that are told half or twice the relaxation length."""
 
 LIMIT = {
     "right tyre": Case(steer=5.0, level=8.0, outliers=0.03),
     "15 % too weak": Case(steer=5.0, level=8.0, outliers=0.03, tyre=0.85),
     "15 % too strong": Case(steer=5.0, level=8.0, outliers=0.03, tyre=1.15),
 }
-"""Near the limit, with both: what an error of the filter's tyre does."""
+"""Near the limit, with both kinds of noise: the effect of an error of the filter's tyre."""
 
 _LOOSE = Case(steer=6.0, level=8.0, outliers=0.03, speed=30.0 / 50.4, friction=0.4)
 
@@ -180,4 +181,4 @@ SLOW = {
 """The lower end of the paper's 30 to 50 km/h, and a loose road there, whose friction filters are told or not."""
 
 SWERVE = {name: CASES[name] for name in ("constant", "both")}
-"""The noise under which the paper's own filter of seven degrees of freedom and others are tried."""
+"""The noise with which the paper's own filter of seven degrees of freedom and others are run."""

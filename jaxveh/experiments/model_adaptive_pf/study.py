@@ -1,4 +1,4 @@
-"""The runs: drives once, then every estimator on the same drives."""
+"""The runs: each drive once, then every estimator on the same drives."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from jaxveh.sweeps import IN_MEMORY, Stores
 
 
 class Raced(NamedTuple):
-    """The `drives`, (cases, seeds, T) each, of cases by name, and what the estimators made of them, `found` with the axes
+    """The `drives`, (cases, seeds, T) each, of `cases` by name, and the results of the estimators, `found`, with the axes
     estimator, case and seed."""
 
     study: Study
@@ -41,7 +41,7 @@ def drives_of(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> Drive:
-    """Drives of each case, one a seed: (cases, seeds, T)."""
+    """Drives of each case, one per seed: (cases, seeds, T)."""
     check_whole("seeds", seeds, 2)
     columns = Case(*(jnp.asarray(np.array(values, float)) for values in zip(*cases.values(), strict=True)))
 
@@ -65,7 +65,8 @@ def race(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> Raced:
-    """Every estimator (or `only` these, or others: `entrants`) on the same drives, (cases, seeds, T); filters draw from `key`."""
+    """Every estimator (or `only` these, or other `entrants`) on the same drives, (cases, seeds, T); filters draw from
+    `key`."""
     every = contestants(study) if entrants is None else entrants
     chosen = {name: every[name] for name in (every if only is None else only)}
     seeds = np.shape(drives.v_x)[1]

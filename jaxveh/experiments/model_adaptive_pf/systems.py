@@ -1,4 +1,4 @@
-"""Every model, method, table and figure of paper 001 (Qin et al. 2014), and who has it here."""
+"""Every model, method, table and figure of paper 001 (Qin et al. 2014), and its place in this package."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SYSTEMS = (
         "filters of several rates",
         "introduction [5, 6]",
         ("statespace.StateSpace",),
-        "no contestant of its own: a channel that is NaN in a row was not measured there, with every filter",
+        "no contestant of its own: with every filter, a channel that is NaN in a row was not measured there",
     ),
     System(
         "dual extended filter, unscented particle filter", "introduction [8, 13]", ("filters.Dual", "filters.Guided")

@@ -1,4 +1,4 @@
-"""The methods of the review, each a function from what a car measures to its sideslip."""
+"""The methods of the review, each a function from a car's measurements to its sideslip."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from jaxveh.statespace import StateSpace
 
 
 class Found(NamedTuple):
-    """An estimate: `v_y` (m/s) and its spread `std` (m/s, NaN where a method knows none), (T,) each; `result`, the first
-    failing code."""
+    """An estimate: `v_y` (m/s) and its standard deviation `std` (m/s, NaN if a method has none), (T,) each; `result`: the
+    first code that is not a success."""
 
     v_y: Any
     std: Any
@@ -27,29 +27,29 @@ class Found(NamedTuple):
 
 
 WHAT = {
-    "open loop": "linear single track, steered, listens to no sensor: the baseline",
+    "open loop": "linear single track with the steer alone, no sensor: the baseline",
     "steady state": "eq 2: yaw rate and a_y, as if the turn were steady",
     "integration": "a_y - v_x r, integrated from straight running",
     "kinematic Kalman": "v_x and v_y driven by accelerometers and gyroscope, v_x measured",
     "linear Kalman": "linear single track",
     "Luenberger": "nonlinear single track, poles placed on straight running",
-    "sliding mode": "the same gain, most of it through a smooth switch",
+    "sliding mode": "the same gain, most of it in a smooth switch",
     "EKF": "nonlinear single track",
     "UKF": "nonlinear single track",
     "PF": "nonlinear single track",
     "UPF": "nonlinear single track, particles drawn given the measurement",
-    "switch": "integration while |a_y| is large, EKF else",
+    "switch": "integration while |a_y| is large, otherwise EKF",
     "pseudo-integration": "slow part of the EKF, fast part of the integration",
     "weighted": "kinematic Kalman and EKF, by their covariances",
     "handling": "the library's handling model, UKF: errors of tyres and a_y are states",
 }
-"""The methods, the one that listens to no sensor first, and what each is."""
+"""The methods, beginning with the one without sensors, and their descriptions."""
 
 Method = Callable[[Drive, Any], Found]
 
 
 class Group(NamedTuple):
-    """Methods that share their work and are one program: `run(drive, key)` gives a `Found` by name of `names`."""
+    """Methods with shared work in one program: `run(drive, key)` gives a `Found` for each of `names`."""
 
     names: tuple[str, ...]
     run: Callable[[Drive, Any], dict[str, Found]]
@@ -69,7 +69,7 @@ def groups(study: Study, cars: Cars, models: Models) -> list[Group]:
         "Luenberger": nonlinear(observers.Luenberger(gain)),
         "sliding mode": nonlinear(sliding),
         "UKF": nonlinear(filters.Unscented()),
-        # One drive after the other: side by side, resampling costs more than twice as much.
+        # One drive after the other: side by side, resampling takes more than twice as long.
         "PF": jax.custom_batching.sequential_vmap(nonlinear(filters.ParticleFilter(study.particles))),
         "UPF": jax.custom_batching.sequential_vmap(nonlinear(filters.Guided(study.particles, rule="unscented"))),
         "handling": run_method(filters.Unscented(), models.handling),
@@ -83,7 +83,7 @@ def _alone(name: str, method: Method) -> Group:
 
 
 def _fusion(study: Study, kinematic: Method, extended: Method) -> Group:
-    """The kinematic and the dynamic filter, and what becomes of both."""
+    """The kinematic and the dynamic filter, and the methods that combine them."""
 
     def run(drive: Drive, key) -> dict[str, Found]:
         fast, slow = kinematic(drive, key), extended(drive, key)
@@ -99,7 +99,7 @@ def _fusion(study: Study, kinematic: Method, extended: Method) -> Group:
 
 
 def gain_of(study: Study, model: StateSpace) -> np.ndarray:
-    """The gain that puts the poles of a straight run at the study's speed where the study wants them, (n, m)."""
+    """The gain that places the poles of a straight run at the study's speed as the study wants them, (n, m)."""
     return observers.place_poles(model, study.poles, dt=study.dt, u={"v_x": study.speed}, leave=("yaw",))
 
 
@@ -117,7 +117,7 @@ def run_method(method, model: StateSpace) -> Method:
 
 
 def integrate_v_y(drive: Drive, key) -> Found:
-    """Lateral velocity by trapezia from zero: nothing but sensors, and nothing that forgets."""
+    """Lateral velocity by the trapezoidal rule from zero: only sensors, without forgetting."""
     del key
     steps = _middle(drive.a_y - drive.v_x * drive.yaw_rate) * jnp.diff(drive.time)
     v_y = jnp.pad(jnp.cumsum(steps), (1, 0))
@@ -125,7 +125,7 @@ def integrate_v_y(drive: Drive, key) -> Found:
 
 
 def steady_state(cars: Cars) -> Method:
-    """Eq 2: `beta = b r / v - m a / (l C_r) a_y`; the printed k_r is of one tyre, C_r = 2 k_r."""
+    """Eq 2: `beta = b r / v - m a / (l C_r) a_y`; the printed k_r belongs to one tyre, C_r = 2 k_r."""
     car = cars.linear
     front, rear = car.front_axle_to_cg, car.rear_axle_to_cg
 
@@ -152,7 +152,8 @@ def pseudo_integrated(time: float, slow: Found, drive: Drive) -> Found:
 
 
 def switch(hard: float, slow: Found, drive: Drive) -> Found:
-    """Nishio et al. (2001) at its simplest: where |a_y| exceeds `hard` (m/s^2) integration goes on from the model's estimate."""
+    """Nishio et al. (2001) in its simplest form: while |a_y| exceeds `hard` (m/s^2), integration continues from the model's
+    estimate."""
     steps = _middle(drive.a_y - drive.v_x * drive.yaw_rate) * jnp.diff(drive.time)
 
     def step(v, given):
@@ -164,7 +165,7 @@ def switch(hard: float, slow: Found, drive: Drive) -> Found:
 
 
 def weighted_mean(fast: Found, slow: Found) -> Found:
-    """Lee (2006): both estimates weighed by the inverses of the variances that their filters state."""
+    """Lee (2006): both estimates weighted by the inverses of the variances of their filters."""
     weights = fast.std**-2, slow.std**-2
     total = weights[0] + weights[1]
     v_y = (weights[0] * fast.v_y + weights[1] * slow.v_y) / total
@@ -172,16 +173,16 @@ def weighted_mean(fast: Found, slow: Found) -> Found:
 
 
 def _middle(values):
-    """Halfway between rows, (T - 1,)."""
+    """Values halfway between rows, (T - 1,)."""
     return 0.5 * (values[1:] + values[:-1])
 
 
 def _from(slow: Found, rest) -> Found:
-    """An estimate that begins where another does."""
+    """An estimate that begins with the first value of another one."""
     v_y = jnp.append(slow.v_y[:1], rest)
     return Found(v_y, jnp.full_like(v_y, jnp.nan), jnp.maximum(slow.result, _worst(v_y)))
 
 
 def _worst(v_y):
-    """0 where all values are finite, else the code of a state that is not."""
+    """0 if all values are finite, otherwise the code of a state that is not."""
     return jnp.where(jnp.all(jnp.isfinite(v_y)), jnp.int32(0), code(Result.non_finite_state))

@@ -1,4 +1,4 @@
-"""The criteria: as they were asked, and what stands beside them."""
+"""The criteria as they were asked, and those that replace or repeat them."""
 
 from __future__ import annotations
 
@@ -13,28 +13,29 @@ LOG_SMOOTHED = "real log: sideslip RMSE with hindsight, degrees"
 
 _DRIVES = "methods are told the data sheet's car, speed and steer"
 _BOUND = (
-    "bound: the library's ready-made estimator on the same rows, whose model was made while their score was looked at some 45 "
-    "times"
+    "bound: the library's ready-made estimator on the same rows, whose model was developed while their score was looked at "
+    "some 45 times"
 )
 
 CRITERIA = {
     RUNS: Terms(_DRIVES),
     CELLS: Terms(
         _DRIVES
-        + "; a cell is open where its 95 % interval holds the limit; limits and statistics as set before numbers were seen"
+        + "; a cell is open if its 95 % interval contains the limit; limits and statistics as set before numbers were seen"
     ),
     CELLS_FAST: Terms(
-        _DRIVES + "; the fast part was taken after a first look, in which drift hid what the row asks", CELLS
+        _DRIVES + "; the fast part was taken after a first look, in which drift hid the fast transients of the row",
+        CELLS,
     ),
     LOG: Terms(
         "calibrated without v_y on the log's first half; the least of all methods by the very rows that score it, so that a lead "
-        "decides nothing; open without a log; " + _BOUND
+        "proves nothing; open without a log; " + _BOUND
     ),
     LOG_CROSSED: Terms(
-        "calibrated likewise; of the scored rows each half chooses the method by its v_y that scores the other; "
+        "calibrated likewise; each half of the scored rows chooses, by its v_y, the method that is scored on the other; "
         + _BOUND,
         LOG,
     ),
-    LOG_SMOOTHED: Terms("the handling model's smoother: every row by all rows; " + _BOUND, LOG),
+    LOG_SMOOTHED: Terms("the handling model's smoother: every row from all rows; " + _BOUND, LOG),
 }
-"""The criteria by name; those that stand beside one as it was asked follow it."""
+"""The criteria by name; those that replace or repeat another follow it."""

@@ -1,4 +1,4 @@
-"""The drives: a car of seven degrees of freedom whose data sheet is wrong by an honest draw."""
+"""The drives: a car of seven degrees of freedom whose data sheet has random errors."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from jaxveh.tyres import MagicFormula, Relaxed, Similarity
 from jaxveh.vehicles import SevenDOF, sets
 
 HARMONICS = 20
-"""Of which steering and banks are made."""
+"""Number of harmonics of steering and banks."""
 
 CHANNELS = ("yaw_rate", "a_x", "a_y")
 
 
 class Drive(NamedTuple):
-    """What estimators may see, (T,) each: `time` (s), `steer` (rad), `v_x` (m/s), `a_x`, `a_y` (m/s^2), `yaw_rate` (rad/s);
-    `fresh`: whether yaw_rate and a_y are new in this row; and the truth: `sideslip` (rad), `lateral` (m/s^2, the true a_y)."""
+    """The channels that estimators may use, (T,) each: `time` (s), `steer` (rad), `v_x` (m/s), `a_x`, `a_y` (m/s^2),
+    `yaw_rate` (rad/s); `fresh`: whether yaw_rate and a_y are new in this row; and the truth: `sideslip` (rad), `lateral`
+    (m/s^2, the true a_y)."""
 
     time: Any
     steer: Any
@@ -49,9 +50,9 @@ def scenario_at(index) -> Scenario:
 
 
 def true_car(study: Study, spread, key) -> SevenDOF:
-    """The car as it is: the data sheet's, each parameter off by a draw of `spread` times the study's."""
+    """The true car: that of the data sheet, with each parameter off by a draw of `spread` times the study's."""
     draws = spread * jax.random.normal(key, (6,))
-    # Lognormal: a draw can halve a parameter, and never makes it negative.
+    # Lognormal: a draw can halve a parameter, but never makes it negative.
     front, rear, grip, mass, inertia = jnp.exp(
         draws[:5] * jnp.asarray([study.stiffness, study.stiffness, study.grip, study.mass, study.yaw_inertia])
     )
@@ -67,7 +68,7 @@ def true_car(study: Study, spread, key) -> SevenDOF:
 
 
 def _tyre(study: Study, axle: int, stiffness, grip) -> Relaxed:
-    """The tyre of one wheel of an axle (0: front): a Magic Formula that stands for all loads, roads and directions."""
+    """The tyre of one wheel of an axle (0: front): a Magic Formula for all loads, roads and directions."""
     numbers = numbers_of()
     load, known = numbers.wheel_loads()[axle], 0.5 * numbers.values()[("front_stiffness", "rear_stiffness")[axle]]
     D = study.peak_friction * load * grip
@@ -91,7 +92,7 @@ def steering(study: Study, scenario: Scenario, key) -> RandomSteering:
 
 
 def road_of(study: Study, scenario: Scenario, key) -> roads.Combined:
-    """A road whose friction changes half way, and with random banks."""
+    """A road whose friction changes half way, with random banks."""
     half = 0.5 * study.speed * study.duration
     drawn = roads.gauss_markov(1.0, study.bank_length, key, shortest=study.bank_length / 3, count=HARMONICS)
     bank = eqx.tree_at(lambda b: b.std, drawn, scenario.bank)

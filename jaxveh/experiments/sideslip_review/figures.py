@@ -1,4 +1,4 @@
-"""The study's pictures: the review's table as numbers, errors by scenario, one drive at the limit, the real log."""
+"""The study's figures: the review's table as numbers, errors by scenario, one drive at the limit, the real log."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def figures(result: Reproduction) -> dict[str, Any]:
 
 
 def marks_figure(raced: Raced) -> Any:
-    """Every cell of the review's table: its number over what is still good, with its interval."""
+    """Every cell of the review's table: its number over the largest good one, with its interval."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 4.0), layout="constrained")
     cells = verdicts(raced)
     with style():
@@ -53,9 +53,7 @@ def marks_figure(raced: Raced) -> Any:
         axes.set_yticks(range(len(cells)), [f"{cell.row}: {cell.method}" for cell in reversed(cells)])
         for name, colour in {**VERDICT_COLOURS, "cannot tell": COLOURS["prior"]}.items():
             axes.plot([], [], color=colour, label=f"the number {name}" if name in VERDICT_COLOURS else name)
-        axes.set(
-            xlabel="number over the largest that is good [-]", title="The review's circles and crosses, as numbers"
-        )
+        axes.set(xlabel="number over the largest good one [-]", title="The review's circles and crosses, as numbers")
         figure.legend(loc="outside upper left", ncols=3)
     return figure
 
@@ -103,7 +101,7 @@ def drive_figure(raced: Raced, scenario: str, seed: int = 0) -> Any:
             course = np.rad2deg(raced.at("course", name, scenario)[seed])
             above.plot(time[rows], course[rows], color=colour, label=name)
             below.plot(time[rows], (course - true)[rows], color=colour)
-        # What drifts away leaves the picture, so that the others can be told apart.
+        # Methods that drift away leave the figure, so that the others can be distinguished.
         most = 2.0 * np.abs(true[rows]).max()
         above.set(ylabel="sideslip [°]", ylim=(-most, most), title=f"One drive: {scenario}")
         below.set(xlabel="time [s]", ylabel="error [°]", ylim=(-most, most))
@@ -112,7 +110,7 @@ def drive_figure(raced: Raced, scenario: str, seed: int = 0) -> Any:
 
 
 def log_figure(logged: Logged) -> Any:
-    """The real log: errors of every method, and a stretch of courses."""
+    """The real log: errors of every method, and a stretch of the courses."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 5.6), layout="constrained")
     order = sorted(logged.rmse, key=lambda name: -logged.rmse[name])
     with style():
@@ -122,7 +120,7 @@ def log_figure(logged: Logged) -> Any:
         above.set_yticks(range(len(order)), order, fontsize=7)
         above.axvline(BEST, color="#444444", linewidth=0.6, linestyle=":")
         above.set_xscale("log")
-        above.set(xlabel="sideslip RMSE [°]", title="Real log, second half; dotted: the library's best before")
+        above.set(xlabel="sideslip RMSE [°]", title="Real log, second half; dotted: the library's best so far")
         time = logged.time - logged.time[0]
         rows = (time > 30.0) & (time < 60.0)
         below.plot(time[rows], np.rad2deg(logged.courses["true"][rows]), color=COLOURS["truth"], label="measured")

@@ -1,4 +1,4 @@
-"""A single track for real logs: what the textbook car leaves out becomes small states with a stated size and memory."""
+"""A single track for real logs: the effects that the textbook car leaves out are small states with given size and memory."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ BEND = 0.03
 """Slip angle (rad) over which the difference between left and right turns fades in, so that straight running is smooth."""
 
 LEAST_GRIP = 0.05
-"""The square of the share of lateral grip that is left however large the longitudinal force."""
+"""The square of the least share of lateral grip, for any longitudinal force."""
 
 
 class HandlingState(NamedTuple):
-    """Lateral velocity `v_y` (m/s) and `yaw_rate` (rad/s) of the centre of gravity; what the tyre laws miss,
-    `front_error` and `rear_error`, as shares of the axles' loads; `a_y_error` (m/s^2), such as bank and roll."""
+    """Lateral velocity `v_y` (m/s) and `yaw_rate` (rad/s) of the centre of gravity; the errors of the tyre laws,
+    `front_error` and `rear_error`, as shares of the axles' loads; `a_y_error` (m/s^2), as from bank and roll."""
 
     v_y: Any
     yaw_rate: Any
@@ -33,8 +33,8 @@ class HandlingState(NamedTuple):
 
 
 class HandlingReport(NamedTuple):
-    """What an Estimate shows: speeds (m/s, rad/s), sideslip and slip angles (rad), forces of the axles (N); the errors of
-    the state; `reference_sideslip` (rad): what a reference turned by `heading_offset` would say of the sideslip."""
+    """The outputs of an Estimate: speeds (m/s, rad/s), sideslip and slip angles (rad), forces of the axles (N); the errors
+    of the state; `reference_sideslip` (rad): the sideslip of a reference that is rotated by `heading_offset`."""
 
     v_y: Any
     yaw_rate: Any
@@ -50,15 +50,15 @@ class HandlingReport(NamedTuple):
 
 
 class Handling(eqx.Module):
-    """A single track with what real logs need beside it.
+    """A single track with the additions that real logs need.
 
-    - `car`: the single track; its axles' tyres scale with load, and load moves with `a_x` where it has a `cg_height`.
-    - `steer_gain` (-), `yaw_rate_offset` (rad/s), `a_y_gain` (-): of the sensors (`car.steer_offset` is the steer's).
-    - `drag` (N/(m/s)^2), `brake_share` (-): longitudinal force `F_x = m a_x + drag v_x^2`; driving at the rear axle,
-      braking by shares, `ellipse` (-): how much of it counts in the friction ellipse, `sqrt(1 - (ellipse F_x / D)^2)`.
-    - `force_offset` (m): how far left of the centre of gravity the longitudinal force pulls.
+    - `car`: the single track; its axles' tyres scale with load, and load moves with `a_x` if it has a `cg_height`.
+    - `steer_gain` (-), `yaw_rate_offset` (rad/s), `a_y_gain` (-): of the sensors (`car.steer_offset` is that of the steer).
+    - `drag` (N/(m/s)^2), `brake_share` (-): longitudinal force `F_x = m a_x + drag v_x^2`, at the rear axle in driving and
+      divided in braking; `ellipse` (-): its weight in the friction ellipse, `sqrt(1 - (ellipse F_x / D)^2)`.
+    - `force_offset` (m): distance of the line of the longitudinal force to the left of the centre of gravity.
     - `front_asymmetry`, `rear_asymmetry` (-): grip lost in left turns and gained in right ones (slip angle positive).
-    - `heading_offset` (rad): by which a reference for sideslip (an INS) is turned against the car; moves no state.
+    - `heading_offset` (rad): rotation of a reference for sideslip (an INS) against the car; moves no state.
     - `force_time`, `bias_time` (s): memory of the first-order Gauss-Markov errors in `HandlingState`.
 
     Inputs: `steer` (rad), `v_x` (m/s), `a_x` (m/s^2). Axes of ISO 8855.
@@ -94,7 +94,7 @@ class Handling(eqx.Module):
 
     @numerics.fence_results
     def _axle(self, tyre, contact, F_x, error, asymmetry):
-        # Grip in newton at this load: what the longitudinal force takes its share of.
+        # Grip in newtons at this load, of which the longitudinal force takes a share.
         grip = tyre.D * contact.load / tyre.nominal_load if tyre.nominal_load is not None else tyre.D
         left = numerics.sqrt(jnp.maximum(1 - (self.ellipse * F_x / grip) ** 2, LEAST_GRIP))
         bent = 1 - asymmetry * jnp.tanh(contact.slip_angle / BEND)
@@ -102,7 +102,7 @@ class Handling(eqx.Module):
 
 
 class _Turning(NamedTuple):
-    """The part of a single track's state that its contacts look at."""
+    """The part of a single track's state that its contacts use."""
 
     v_y: Any
     yaw_rate: Any
@@ -124,7 +124,7 @@ def derivatives(system: Handling, t, x: HandlingState, u) -> HandlingState:
 
 
 def observation(system: Handling, t, x: HandlingState, u):
-    """Yaw rate and lateral acceleration as the sensors say them."""
+    """Yaw rate and lateral acceleration as the sensors measure them."""
     del t
     F_yf, _, F_r, _, _ = system.axle_forces(x, u)
     a_y = system.a_y_gain * (F_yf + F_r) / system.car.mass + x.a_y_error
@@ -132,7 +132,7 @@ def observation(system: Handling, t, x: HandlingState, u):
 
 
 def report(system: Handling, t, x: HandlingState, u) -> HandlingReport:
-    """The quantities that an Estimate shows."""
+    """The outputs of an Estimate."""
     del t
     _, F_f, F_r, _, contacts = system.axle_forces(x, u)
     sideslip = numerics.arctan2(x.v_y, jnp.broadcast_to(u.v_x, jnp.shape(x.v_y)))
@@ -156,7 +156,8 @@ PROPAGATE = Propagate(derivatives, Heun())
 
 
 def handling_model(system: Handling) -> StateSpace:
-    """The state space of a real log, with levels of noise that a fit starts from (stated in the code, unit by unit)."""
+    """The state space for a real log, with noise levels from which a fit starts (given in the code, in the units of their
+    channels)."""
     noise = {"v_y": 0.1, "yaw_rate": 0.05, "front_error": 0.08, "rear_error": 0.08, "a_y_error": 0.25}
     spread = {"v_y": 1.0, "yaw_rate": 0.1, "front_error": 0.04, "rear_error": 0.04, "a_y_error": 0.3}
     return StateSpace(

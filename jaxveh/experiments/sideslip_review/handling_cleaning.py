@@ -1,4 +1,4 @@
-"""What the handling model and the single tracks need of a real log, looking back only."""
+"""The cleaning of a real log for the handling model and the single tracks, causal."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from jaxveh.estimators import kit
 from jaxveh.sensors import LowPass
 
 STEER_RATE = 3.0
-"""rad/s at the road wheels: no driver steers faster, so that a sample beyond it is a spike and the last one is held."""
+"""rad/s at the road wheels: no driver steers faster; a sample beyond it is a spike, and the last one is held."""
 
 LONGEST_SPIKE = 0.1
-"""s: what lasts longer is no spike."""
+"""s: a longer change is no spike."""
 
 A_X_CUTOFF = 1.6
 """Hz: the axle loads follow the longitudinal acceleration, not its vibration."""
@@ -27,11 +27,11 @@ BLIND = (
     kit.Need("a_y", "m/s^2"),
     kit.Need("yaw_rate", "rad/s"),
 )
-"""What sideslip is estimated from, blind."""
+"""The channels from which sideslip is estimated blind."""
 
 
 class HandlingMemory(NamedTuple):
-    """The last steer (rad) that was no spike and its time (s); the row before as it came; and the low-pass' state."""
+    """The last steer (rad) that was no spike and its time (s); the previous row as measured; and the state of the low-pass."""
 
     steer: Any
     steer_time: Any
@@ -45,8 +45,9 @@ class HandlingMemory(NamedTuple):
 class HandlingCleaning(kit.AbstractCleaning):
     """Steer spikes held, a_x low-passed (first order, settled at the first row), and repeated measurements as missing.
 
-    Loggers repeat the last value where a sensor was slower than the log: a row in which neither `yaw_rate` nor `a_y` moved
-    holds no news, and counting it twice would make a filter too sure. `steer_rate` (rad/s) and `longest` (s) tell a spike.
+    Loggers repeat the last value if a sensor is slower than the log: a row in which neither `yaw_rate` nor `a_y` changes has
+    no new information, and counting it twice would make a filter overconfident. `steer_rate` (rad/s) and `longest` (s)
+    define a spike.
     """
 
     steer_rate: float = eqx.field(static=True, default=STEER_RATE)
@@ -80,7 +81,7 @@ class HandlingCleaning(kit.AbstractCleaning):
 def clean(recording: Recording) -> Recording:
     """The log with steer spikes held, a_x low-passed, and repeated measurements as missing: see `HandlingCleaning`.
 
-    **Raises** `InputError` where a channel is missing, or an input is NaN (fill it on request first).
+    **Raises** `InputError` if a channel is missing, or if an input is NaN (fill it on request first).
     """
     kit.check_needs("sideslip review", BLIND, recording)
     return kit.clean_recording(HandlingCleaning(), recording)

@@ -1,4 +1,4 @@
-"""The handling model of a car's file, and its fit to a log: what the library did before it asked the rear axle alone."""
+"""The handling model of a car's file, and its fit to a log: the library's method before it used the rear axle alone."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from jaxveh.tyres import MagicFormula, kit
 from jaxveh.vehicles import from_specification
 
 START = kit.GenericTyre(friction=1.1, E=0.0)
-"""Of axles that a car's file gives a cornering stiffness alone. More friction and a rounder peak than `kit.GENERIC_TYRE`, with
-which cars are drawn: at the file's word, on the second halves of two logs, 0.30 degrees instead of 0.42 (Ferrari) and 48 instead
-of 65 (F1TENTH)."""
+"""The tyre of axles for which a car's file has only a cornering stiffness. More friction and a rounder peak than
+`kit.GENERIC_TYRE`, with which cars are drawn: without calibration, on the second halves of two logs, 0.30 degrees instead of
+0.42 (Ferrari) and 48 instead of 65 (F1TENTH)."""
 
 GENERIC_CG_HEIGHT = 0.45
-"""m above ground, where a car's file is silent."""
+"""m above ground, if a car's file has none."""
 
 PRIOR = {
     "B": 0.3, "D": 0.15, "E": 0.25, "cg_height": 0.22, "yaw_inertia": 0.2, "steer_offset": 0.15, "steer_gain": 0.03,
@@ -33,7 +33,8 @@ PRIOR = {
     "front_asymmetry": 1.0, "rear_asymmetry": 1.0, "heading_offset": 1.0, "force_time": 0.7, "bias_time": 0.7,
     "v_y": 0.7, "yaw_rate": 0.7, "front_error": 0.5, "rear_error": 0.5, "a_y_error": 0.7, "a_y": 0.5,
 }  # fmt: skip
-"""Relative prior spreads by name, on each parameter's own line (unbounded ones in units of their declared scale)."""
+"""Relative standard deviations of the prior by name, on each parameter's own line (unbounded ones in units of their declared
+scale)."""
 
 
 def chosen_parameters(model: Any):
@@ -47,7 +48,8 @@ def chosen_parameters(model: Any):
 
 
 def handling_car(car: CarSpecification) -> Handling:
-    """The handling model of a car file: its own tyres where it has them, generic ones of its cornering stiffness else."""
+    """The handling model of a car's file: with its own tyres if it has them, otherwise generic ones with its cornering
+    stiffness."""
     known = from_specification(dataclasses.replace(car, cg_height=car.cg_height or GENERIC_CG_HEIGHT))
     loads = known.static_loads()
     axles = [
@@ -58,14 +60,14 @@ def handling_car(car: CarSpecification) -> Handling:
 
 
 def _generic(tyre: MagicFormula, load, told: bool) -> MagicFormula:
-    """An axle that scales with load: as told, at its static load, or generic with the tyre's cornering stiffness."""
+    """An axle that scales with load: as given, at its static load, or generic with the tyre's cornering stiffness."""
     if told:
         return MagicFormula(tyre.B, tyre.C, tyre.D, tyre.E, tyre.S_h, tyre.S_v, nominal_load=load)
     return START.magic_formula(tyre.cornering_stiffness, load)
 
 
 def fitted_model(told: CarSpecification, log: Recording, progress: Progress = silent) -> StateSpace:
-    """The handling model of the greatest posterior on pieces of a log, blind."""
+    """The handling model with the greatest posterior on pieces of a log, blind."""
     pieces, warm_up = estimators.kit.cut_pieces(clean(log))
     start = handling_model(handling_car(told))
     fit = prediction_error(

@@ -1,12 +1,13 @@
-"""A network inside the filter against physics alone, by how much data there is to learn from.
+"""A network inside the filter compared with physics alone, by the amount of data for training.
 
     python -m jaxveh.experiments.sideslip_review.hybrid --minutes 1,5 --cars passenger_car,sedan --seeds 2
 
-The truth is a single track on Magic Formulas that fall behind their peaks, which the brush tyres of the filter cannot form, and
-whose stiffnesses are wrong by 13 to 15 % before. Fitted on drives of so many minutes through the likelihood of an extended filter
-(`estimators.learned.train`): the brushes alone, and the brushes with a network each. Judged by an unscented filter's sideslip on
-drives that nothing was fitted on, beside what nobody fitted and the true law. Law and truth share all but the tyres: it is the
-best case for both. Some minutes for each line on two cores. Needs the extra `learn`.
+The truth is a single track on Magic Formulas whose force falls beyond its peak, which the filter's brush tyres cannot
+reproduce; the brush stiffnesses are wrong by 13 to 15 % before the fit. Two models are fitted to drives of the given number
+of minutes by the likelihood of an extended filter (`estimators.learned.train`): the brushes alone, and the brushes with one
+network each. They are judged by the sideslip of an unscented filter on drives to which nothing was fitted, beside the model
+before the fit and the true tyre law. Model and truth differ only in the tyres: it is the best case for both. Some minutes
+per line on two cores. Needs the extra `learn`.
 """
 
 from __future__ import annotations
@@ -35,16 +36,17 @@ GRIP = (0.85, 1.05)
 """Largest lateral force over load of the true axles: the front one slides first, so that the car does not spin."""
 
 WRONG = (1.15, 0.87)
-"""Of the stiffnesses before the fit, front and rear, over the true ones."""
+"""Ratio of the stiffnesses before the fit to the true ones, front and rear."""
 
 SHAPE = {"C": 1.6, "E": -1.5}
-"""Of the true Magic Formulas: their peak is at 6 to 7 degrees of slip, and by 25 a quarter of the force is lost."""
+"""Shape of the true Magic Formulas: their peak is at 6 to 7 degrees of slip, and at 25 degrees a quarter of the force is
+lost."""
 
 SPEED, STEER, STEP, SETTLED = 25.0, 0.05, 0.02, 2.0
-"""m/s; rad, standard deviation at the road wheels; s between rows; s of a judged drive that do not count."""
+"""m/s; rad, standard deviation at the road wheels; s between rows; s at the beginning of a judged drive that do not count."""
 
 JUDGED, LENGTH = 2, 60.0
-"""Drives that judge, and s of each."""
+"""Number of drives for judging, and s of each."""
 
 DEVICE = sensors.esc(yaw_rate=0.002, a_y=0.05)
 
@@ -57,7 +59,7 @@ COLUMNS = ("car", "minutes", "seed", "nothing fitted", "physics", "with networks
 
 
 def true_and_told(name: str) -> tuple[Any, Any]:
-    """A car on the true tyres, and on the brushes that are told."""
+    """A car on the true tyres, and the same car on the brushes that the filter is told."""
     car = vehicles.named_car(name, "single-track")
     slopes = [slope * load for slope, load in zip(SLOPES, car.static_loads(), strict=True)]
     formula = lambda slope, most: tyres.MagicFormula(B=slope / (SHAPE["C"] * most), D=most, **SHAPE)
@@ -70,19 +72,19 @@ def true_and_told(name: str) -> tuple[Any, Any]:
 
 
 def drive(car: Any, seconds: float, key: jax.Array) -> Recording:
-    """Random steering."""
+    """A drive with random steering."""
     steer_key, noise_key = jax.random.split(key)
     wander = random_steering(SPEED, STEER, steer_key, lowest=0.1, highest=1.0, duration=seconds)
     return simulate(car, wander, DEVICE, noise_key, dt=STEP)
 
 
 def model_of(car: Any) -> StateSpace:
-    """What the filters see."""
+    """The filters' state space."""
     return state_space(car, DEVICE, process_noise={"v_y": 0.05, "yaw_rate": 0.02})
 
 
 def sideslip_errors(model: StateSpace, drives: Sequence[Recording]) -> float:
-    """Root mean square over the drives, degrees."""
+    """Root mean square error over the drives, degrees."""
     first = round(SETTLED / STEP)
     errors = []
     for log in drives:
@@ -92,7 +94,7 @@ def sideslip_errors(model: StateSpace, drives: Sequence[Recording]) -> float:
 
 
 def _brushes(model: StateSpace) -> tuple:
-    """What physics has to fit: both tyres and the process noise."""
+    """The parameters that physics alone has to fit: both tyres and the process noise."""
     car = model.system.vehicle
     inner = [getattr(tyre, "tyre", tyre) for tyre in (car.front, car.rear)]
     numbers = [getattr(tyre, name) for tyre in inner for name in ("cornering_stiffness", "friction")]
@@ -136,17 +138,19 @@ def hybrid_table(
     steps: int = 300,
     progress: Progress = silent,
 ) -> Table:
-    """All of them."""
+    """The lines of all cars, minutes and seeds."""
     every = [(name, length, seed) for name in cars for length in minutes for seed in range(seeds)]
     rows = []
     for i, one in enumerate(every):
         told = part(progress, i / len(every), (i + 1) / len(every), f"{one[0]}, {one[1]:g} min, seed {one[2]}")
         rows.append(compare_networks(*one, key, steps=steps, progress=told))
-    return Table("Sideslip RMSE [deg] on drives that nothing was fitted on, by minutes that were", COLUMNS, rows)
+    return Table(
+        "Sideslip RMSE [deg] on drives to which nothing was fitted, by minutes of the fitted drives", COLUMNS, rows
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The module's docstring says what."""
+    """Run the program that the module's docstring describes."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     listed = lambda text: tuple(text.split(","))
     parser.add_argument("--minutes", type=lambda text: tuple(float(one) for one in text.split(",")), default=(1.0, 5.0))

@@ -1,4 +1,4 @@
-"""What the estimators believe: the engineer's cars, and the kinematics of a point."""
+"""The estimators' models: the engineer's cars, and the kinematics of a point."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from jaxveh.statespace import Continuous, Gaussian, Heun, Prior, Propagate, Row,
 from jaxveh.vehicles import LinearSingleTrack, SingleTrack
 
 SEEN = "seen_"
-"""Names of measurement noise begin so."""
+"""Prefix of the names of measurement noise."""
 
 KinematicState = record_type("KinematicState", ("v_x", "v_y"))
 
 
 class Cars(NamedTuple):
-    """What an engineer knows: the linear car, the one with nonlinear tyres, and the `Handling` around the latter."""
+    """The cars that an engineer is told: the linear car, the one with nonlinear tyres, and the `Handling` around the
+    latter."""
 
     linear: LinearSingleTrack
     nonlinear: SingleTrack
@@ -38,7 +39,7 @@ class Models(NamedTuple):
 
 
 def sheet_cars() -> Cars:
-    """The cars of the data sheet: stiffnesses are known, else tyres are ordinary."""
+    """The cars of the data sheet: with its stiffnesses, and otherwise ordinary tyres."""
     numbers = numbers_of()
     track = vehicles.build(numbers, SingleTrack)
     loads = track.static_loads()
@@ -107,7 +108,7 @@ def _handling_with_noise(system: Handling, noise: dict[str, float]) -> StateSpac
 
 
 def rows(model: StateSpace, drive: Drive) -> Row:
-    """The drive as this model sees it."""
+    """The drive as rows of this model."""
     seen = drive._asdict()
     u = record_type("Inputs", model.inputs)(*[seen[name] for name in model.inputs])
     fresh = lambda name: seen[name] if name == "v_x" else jnp.where(drive.fresh, seen[name], jnp.nan)

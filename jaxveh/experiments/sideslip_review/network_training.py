@@ -1,10 +1,10 @@
-"""The weights of the neural network among the methods of sideslip, trained on cars that no table shows.
+"""The weights of the neural network among the methods of sideslip, trained on cars that are in no table.
 
     python -m jaxveh.experiments.sideslip_review.network_training --out network.npz
 
-simulates drives of `TRAINED_ON` in all scenarios of the chapters, prints for each candidate the error on each of these cars when
-the others alone were learned from, and writes the weights of the best of them, learned from all. The cars of the chapters
-(`fleet.CARS`) have no part in it. Needs the extra `learn`; some minutes on two cores.
+simulates drives of `TRAINED_ON` in all scenarios of the chapters, prints for each candidate the error on each of these cars
+after training on the others, and writes the weights of the best candidate, trained on all. The cars of the chapters
+(`fleet.CARS`) are not used. Needs the extra `learn`; some minutes on two cores.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ SEEDS, DURATION = 25, 40.0
 """Drives of each scenario, and s of each."""
 
 EVERY = 5
-"""Rows of 0.01 s, of which one is learned from."""
+"""One of so many rows of 0.01 s is used for training."""
 
 SETTLED = 2.0
-"""s: not learned from."""
+"""s at the beginning that are not used for training."""
 
 
 class Candidate(NamedTuple):
-    """Units of each of the two hidden layers, and how much weights are pulled to zero (AdamW)."""
+    """Units of each of the two hidden layers, and the decay of the weights towards zero (AdamW)."""
 
     width: int
     decay: float
@@ -51,7 +51,7 @@ CANDIDATES = (Candidate(12, 1e-3), Candidate(12, 1e-1), Candidate(32, 1e-3), Can
 
 
 class Rows(NamedTuple):
-    """What is learned from: `features` (N, size), `slip` of the rear axle (N,) in units of the network, `car` (N,)."""
+    """The training data: `features` (N, size), `slip` of the rear axle (N,) in units of the network, `car` (N,)."""
 
     features: np.ndarray
     slip: np.ndarray
@@ -63,7 +63,7 @@ def learned_rows(
 ) -> Rows:
     """Simulated drives as features and truths."""
     drives = chapter_drives(seeds, key, duration=duration, cars=TRAINED_ON, progress=progress, stores=stores)
-    # What the network says is not looked at here.
+    # The output of the network is not used here.
     blank = eqx.nn.MLP(learned.SideslipNetwork.size, 2, 1, 2, jnp.tanh, key=key)
     networks = [learned.sideslip_network(car, blank) for car in told_cars(TRAINED_ON)]
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[eqx.filter(n, eqx.is_array) for n in networks])
@@ -91,7 +91,7 @@ def learned_rows(
 
 
 def network_features(network, values) -> jax.Array:
-    """(T, size) of a drive in rows of `STEP`."""
+    """Features (T, size) of a drive in rows of `STEP`."""
     time = STEP * jnp.arange(values["v_x"].shape[0])
 
     def body(memory, row):
@@ -106,13 +106,14 @@ def network_features(network, values) -> jax.Array:
 
 
 def _held(values: np.ndarray) -> np.ndarray:
-    """The last that was measured, 0 before."""
+    """The last measured value, 0 before the first."""
     last = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(values.size), -1))
     return np.where(last < 0, 0.0, np.nan_to_num(values)[np.maximum(last, 0)])
 
 
 def trained_network(rows: Rows, candidate: Candidate, key, *, steps: int = 4000, batch: int = 1024, rate: float = 3e-3):
-    """The network that says the rows' slips best, as Gaussians with a spread of their own. Each car counts alike."""
+    """The network that predicts the rows' slips best, as Gaussians with their own standard deviations. Each car has equal
+    weight."""
     optax = io.require("optax", "training a network", "learn")
     start_key, draw_key = jax.random.split(key)
     features, slip = jnp.asarray(rows.features), jnp.asarray(rows.slip)
@@ -145,8 +146,8 @@ def trained_network(rows: Rows, candidate: Candidate, key, *, steps: int = 4000,
 
 
 def crossed_errors(rows: Rows, candidate: Candidate, key) -> tuple[np.ndarray, np.ndarray]:
-    """Root mean square errors of the slip angle (rad), and of the error over its spread, on each car when only the others were
-    learned from, (cars,) each."""
+    """Root mean square errors of the slip angle (rad), and of the error over its standard deviation, on each car after
+    training on the others, (cars,) each."""
     errors, whitened = [], []
     for car in range(len(TRAINED_ON)):
         kept = rows.car != car
@@ -161,14 +162,14 @@ def crossed_errors(rows: Rows, candidate: Candidate, key) -> tuple[np.ndarray, n
 
 
 def write_weights(path: Path, network, *, overwrite: bool = False) -> None:
-    """Layer by layer, in float32. **Raises** `InputError` where there is such a file, unless `overwrite`."""
+    """Write the weights layer by layer, in float32. **Raises** `InputError` if the file exists, unless `overwrite`."""
     arrays = [leaf for layer in network.layers for leaf in (layer.weight, layer.bias)]
     with replacing_file(path, overwrite) as part, part.open("wb") as file:
         np.savez_compressed(file, **{f"{i:02d}": np.asarray(array, np.float32) for i, array in enumerate(arrays)})
 
 
 def main(arguments: list[str], progress: Progress = silent) -> None:
-    """The module's docstring says what."""
+    """Run the program that the module's docstring describes."""
     if len(arguments) != 2 or arguments[0] != "--out":
         raise SystemExit(__doc__)
     jax.config.update("jax_enable_x64", True)
@@ -183,7 +184,7 @@ def main(arguments: list[str], progress: Progress = silent) -> None:
         told = ", ".join(
             f"{name} {np.degrees(e):.3f} ({w:.2f})" for name, e, w in zip(TRAINED_ON, errors, whitened, strict=True)
         )
-        print(f"{candidate}: RMSE in degrees (error over spread) on the car left out: {told}", flush=True)
+        print(f"{candidate}: RMSE in degrees (error over standard deviation) on the car left out: {told}", flush=True)
         mean = float(np.exp(np.mean(np.log(errors))))
         if mean < least:
             best, least = candidate, mean

@@ -1,8 +1,8 @@
-"""The review's own equations, as printed and as they should be, on the electric car.
+"""The review's own equations, as printed and corrected, on the electric car.
 
-Errata. The letter k is the stiffness of one tyre in (1) and (2), of an axle in (16) and (17). (4): the second term of H must be
-`k_alpha tan(alpha) / ((1 - lambda) mu F_z)`, and the force below H = 1/2 is missing, `lambda / (1 - lambda) k_lambda`. (5) has
-the opposite sign of (6) and (7). (15): F_yr has no cos(delta_f). (17): `l r / v - delta`, not plus.
+Errata. The letter k is the stiffness of one tyre in (1) and (2), of an axle in (16) and (17). (4): the second term of H must
+be `k_alpha tan(alpha) / ((1 - lambda) mu F_z)`, and the force below H = 1/2 is missing, `lambda / (1 - lambda) k_lambda`.
+(5) has the opposite sign of (6) and (7). (15): F_yr has no cos(delta_f). (17): `l r / v - delta`, not plus.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SPEED, STEER = 20.0, 0.02
 
 
 class Line(NamedTuple):
-    """A quantity: its equation, in words, its `printed` and its `corrected` value, and what it `should` be."""
+    """A quantity: its `equation`, a description (`what`), its `printed` and its `corrected` value, and what it `should` be."""
 
     equation: str
     what: str
@@ -35,7 +35,7 @@ class Line(NamedTuple):
 
 
 def equations() -> Table:
-    """What the printed equations say."""
+    """The values of the printed equations."""
     rows = [tuple(line) for line in (*_steady(), *_place(), *_slip_checks(), *_sign(), *_rear())]
     return Table(
         "The review's equations, as printed and with their errata corrected",
@@ -59,7 +59,7 @@ def steady_turn(speed: float = SPEED, steer: float = STEER) -> tuple[float, floa
 
 
 def steer_sideslip(k_f: float, k_r: float, speed: float = SPEED, steer: float = STEER) -> float:
-    """Eq 1, k of one tyre: sideslip of a steer angle, rad."""
+    """Eq 1, k of one tyre: sideslip from the steer angle, rad."""
     car = numbers_of()
     a, b, l, m = car.front_axle_to_cg, car.rear_axle_to_cg, car.wheelbase, car.mass or 0.0
     above = 1 - m * a * speed**2 / (2 * b * k_r * l)
@@ -67,7 +67,7 @@ def steer_sideslip(k_f: float, k_r: float, speed: float = SPEED, steer: float = 
 
 
 def sensed_sideslip(k_r: float, yaw_rate: float, a_y: float, speed: float = SPEED) -> float:
-    """Eq 2, k of one tyre: sideslip of yaw rate and a_y, rad."""
+    """Eq 2, k of one tyre: sideslip from yaw rate and a_y, rad."""
     car = numbers_of()
     return (
         car.rear_axle_to_cg / speed * yaw_rate
@@ -86,18 +86,18 @@ def _steady() -> list[Line]:
     shown = lambda value: math.degrees(value)
     return [
         Line(
-            "1", "sideslip of steer, degrees (k read as an axle's; corrected: a tyre's)",
+            "1", "sideslip from steer, degrees (k read as an axle's; corrected: a tyre's)",
             shown(steer_sideslip(C_f, C_r)), shown(steer_sideslip(C_f / 2, C_r / 2)), shown(sideslip),
         ),
         Line(
-            "2", "sideslip of yaw rate and a_y, degrees (likewise)",
+            "2", "sideslip from yaw rate and a_y, degrees (likewise)",
             shown(sensed_sideslip(C_r, yaw_rate, a_y)), shown(sensed_sideslip(C_r / 2, yaw_rate, a_y)), shown(sideslip),
         ),
     ]  # fmt: skip
 
 
 def _place() -> list[Line]:
-    """Eq 17: where the centre of gravity is, of a steady turn."""
+    """Eq 17: the position of the centre of gravity from a steady turn."""
     car, (C_f, C_r), (_, yaw_rate, a_y) = numbers_of(), _stiffnesses(), steady_turn()
     share = lambda sign: (
         (1 + C_f / ((car.mass or 0.0) * a_y) * (car.wheelbase * yaw_rate / SPEED + sign * STEER)) / (C_f / C_r + 1)
@@ -120,7 +120,8 @@ def braking(ratio: float, slip_angle: float, printed: bool) -> float:
 
 
 def _slip_checks() -> list[Line]:
-    """Eq 4 at small slip, where the force is nearly `K lambda`, and beside a slip angle; the library's HSRI tyre judges."""
+    """Eq 4 at small slip, where the force is nearly `K lambda`, and with a slip angle; the reference is the library's HSRI
+    tyre."""
     tyre, lines = tyres.HSRI(K, K_A), []
     for what, ratio, degrees in (("rolling straight", 0.01, 0.0), ("at 5 degrees", 0.05, 5.0)):
         angle = math.radians(degrees)
@@ -131,7 +132,7 @@ def _slip_checks() -> list[Line]:
 
 
 def _sign() -> list[Line]:
-    """Eq 5 at one slip angle; the library's parabolic tyre judges, whose slip angles are those of eqs 6 and 7."""
+    """Eq 5 at one slip angle; the reference is the library's parabolic tyre, whose slip angles are those of eqs 6 and 7."""
     alpha = 0.03
     force = K_A * alpha - K_A**2 * alpha**2 / (4 * LIMIT)
     contact = tyres.Contact(slip_angle=jnp.asarray(alpha), load=jnp.asarray(LIMIT))

@@ -27,26 +27,26 @@ from jaxveh.statespace import StateSpace
 from jaxveh.vehicles import LinearSingleTrack
 
 BEST = 0.2312
-"""Degrees: the RMSE of the handling model, calibrated blind, on the Ferrari log, rows 13750 on, v_y never seen. It was made
-while the score of these rows was looked at."""
+"""Degrees: the RMSE of the handling model, calibrated blind, on the Ferrari log, rows 13750 on, without v_y. The model was
+developed while the score of these rows was known."""
 
 READY = ("ready-made, as told", "ready-made, calibrated blind")
-"""The library's `estimators.sideslip`, looking back only, by what it knows of the car."""
+"""The library's `estimators.sideslip`, causal, with the car as told and calibrated."""
 
 SMOOTHED = "handling, smoothed"
-"""With hindsight: every row by all rows."""
+"""The smoother: every row from all rows."""
 
 SPREAD = 1.0
-"""Of the noise levels before they are fitted, on their logarithms."""
+"""Standard deviation of the logarithms of the noise levels before the fit."""
 
 EVERY = 10
 """Rows between those of the courses that are kept."""
 
 
 class Logged(NamedTuple):
-    """What the methods made of a log's second half: `rmse` (degrees) and `failed` by name, READY first; `halves`: RMSE on the
-    first and the second half of those rows; the `time` (s) and the courses of sideslip (rad), `true` among them; the fitted
-    `noise`."""
+    """Results of the methods on a log's second half: `rmse` (degrees) and `failed` by name, READY first; `halves`: RMSE on
+    the first and the second half of those rows; the `time` (s) and the `courses` of sideslip (rad), `true` among them; the
+    fitted `noise`."""
 
     source: str
     rows: int
@@ -59,21 +59,22 @@ class Logged(NamedTuple):
 
     @property
     def best(self) -> str:
-        """The best method that looks at nothing later than its row and is not the library's as it is.
+        """The best causal method, without the library's ready-made ones.
 
-        It is found by the very rows that score it: a small lead of the best of so many methods says little.
+        The rows that score it also choose it: a small lead of the best of so many methods means little.
         """
         return self._least(self.rmse)
 
     @property
     def choices(self) -> tuple[str, str]:
-        """The methods that score on the first and on the second half: each the best of the other half."""
+        """The methods that are scored on the first and on the second half: each is the best on the other half."""
         first, second = (self._least({name: both[i] for name, both in self.halves.items()}) for i in (0, 1))
         return second, first
 
     @property
     def crossed_rmse(self) -> float:
-        """The RMSE (degrees) of all rows where each half, weighing alike, is scored by the method that the other chose."""
+        """The RMSE (degrees) of all rows, with equal weight of both halves; each is scored with the method that the other
+        half chose."""
         errors = [self.halves[name][i] for i, name in enumerate(self.choices)]
         return float(np.sqrt(np.mean(np.square(errors))))
 
@@ -83,13 +84,14 @@ class Logged(NamedTuple):
 
 
 def read(log: Any, car: Any) -> tuple[Recording, io.CarSpecification]:
-    """A log and a car, given as paths or as they are."""
+    """A log and a car, given as paths or as objects."""
     recording = io.read_recording(log) if isinstance(log, str | Path) else log
     return recording, io.read_car(car) if isinstance(car, str | Path) else car
 
 
 def on_log(study: Study, log: Any, car: Any, progress: Progress = silent) -> Logged:
-    """Every method on the second half of a log with v_y, for scoring alone; cars and noises are fitted to the first, blind."""
+    """Every method on the second half of a log, whose v_y is only used for scoring; cars and noises are fitted blind to the
+    first."""
     recording, told = read(log, car)
     half = len(recording) // 2
     blind = recording.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"])
@@ -119,11 +121,11 @@ def log_cars(told: io.CarSpecification, model: StateSpace) -> Cars:
 
 
 def drive_of(blind: Recording, whole: Recording) -> Drive:
-    """A log as the methods see it: cleaned, repeated measurements as old news; the truth from its v_y."""
+    """A log as a `Drive`: cleaned, with repeated measurements marked as old; the truth from its v_y."""
     cleaned = clean(blind)
     seen = {name: jnp.asarray(cleaned[name]) for name in ("steer", "v_x", "a_x")}
     sideslip = jnp.arctan2(jnp.asarray(whole["v_y"]), jnp.asarray(whole["v_x"]))
-    # Integration takes what the logger holds, filters only what is new.
+    # Integration uses the values that the logger holds, filters only new ones.
     a_y, yaw_rate = jnp.asarray(blind["a_y"]), jnp.asarray(blind["yaw_rate"])
     fresh = jnp.isfinite(jnp.asarray(cleaned["yaw_rate"]))
     return Drive(
@@ -132,9 +134,9 @@ def drive_of(blind: Recording, whole: Recording) -> Drive:
 
 
 def fitted_noise(cars: Cars, start: Noise, log: Recording, speed: float) -> Noise:
-    """The noise levels of the greatest posterior on pieces of a cleaned log, about wide priors."""
+    """The noise levels with the greatest posterior on pieces of a cleaned log, with wide priors."""
     pieces, warm_up = kit.cut_pieces(log)
-    # The kinematics takes accelerations for inputs, which must be there.
+    # The kinematics takes accelerations as inputs, which must be there.
     held, _ = kit.cut_pieces(log.fill("a_y", "hold", max_gap=1.0).fill("yaw_rate", "hold", max_gap=1.0))
     models, found = models_of(cars, start, speed), {}
     for name, method in (

@@ -49,12 +49,12 @@ FIRST = next(iter(WHAT))
 """The baseline."""
 
 CHAPTER_SEEDS, CHAPTER_DURATION = 6, 40.0
-"""Of the chapters, whose cars cost fifty times as much: seeds at most, and s of a drive."""
+"""Most seeds of the chapters, whose cars take fifty times as long, and s of a drive."""
 
 
 class Reproduction(NamedTuple):
-    """Everything the experiment found: the simulated drives, the real log (None: none was given), and the chapters (None: they
-    were left out)."""
+    """All results of the experiment: the simulated drives (`raced`), the real log (`logged`; None if none was given), and
+    the `chapters` (None if left out)."""
 
     seeds: int
     raced: Raced
@@ -102,7 +102,7 @@ def _chapters(seeds: int, seed: int, progress: Progress, stores: Stores) -> Chap
 
 
 def check(result: Reproduction) -> list[Check]:
-    """The criteria, each with its condition (`criteria`). What was not looked at, the log where none was given, stays open."""
+    """The criteria, each with its condition (`criteria`). Those of a log stay open if no log was given."""
     raced = result.raced
     failed = sum(float(values["failed"].sum()) for values in raced.found.values())
     cells = [_cells(CELLS, raced, FIRST_ROWS), _cells(CELLS_FAST, raced, ROWS)]
@@ -110,7 +110,7 @@ def check(result: Reproduction) -> list[Check]:
 
 
 def _cells(name: str, raced: Raced, rows: Mapping[str, Statistic]) -> Check:
-    """How many cells are neither supported nor contradicted; one without a number at all is a failure."""
+    """The number of cells that are neither supported nor contradicted; a cell without a number is a failure."""
     found = [cell.verdict for cell in verdicts(raced, rows)]
     check = at_most(name, sum(verdict in (OPEN, "") for verdict in found), 0)
     return check if check.holds or "" in found else leave_open(check)
@@ -121,7 +121,7 @@ def _log_checks(logged: Logged | None) -> list[Check]:
         return [leave_open(at_most(name, float("nan"), BEST)) for name in (LOG, LOG_CROSSED, LOG_SMOOTHED)]
     least = at_most(LOG, logged.rmse[logged.best], BEST)
     return [
-        # The least of many by the rows that score it: that it is larger says something, that it is smaller does not.
+        # The least of many on the rows that score it: a larger value is a result, a smaller one is not.
         leave_open(least) if least.holds else least,
         at_most(LOG_CROSSED, logged.crossed_rmse, BEST),
         at_most(LOG_SMOOTHED, logged.rmse[SMOOTHED], BEST),
@@ -129,7 +129,7 @@ def _log_checks(logged: Logged | None) -> list[Check]:
 
 
 def tables(result: Reproduction) -> list[Table]:
-    """The tables, the open loop in each that ranks methods."""
+    """The tables; those that rank methods include the open loop."""
     return [
         _verdict_table(result, FIRST_ROWS, "statistics as set before numbers were seen"),
         _verdict_table(result, ROWS, "transients by the fast part alone, as decided after a first look"),
@@ -147,7 +147,7 @@ def tables(result: Reproduction) -> list[Table]:
 def as_printed(
     *, seeds: int = 20, seed: int = 0, progress: Progress = silent, stores: Stores = IN_MEMORY
 ) -> list[Table]:
-    """The review's own equations as printed and as they should be; nothing in them is random."""
+    """The review's own equations as printed and corrected; nothing in them is random."""
     del seeds, seed, stores
     progress(1.0, 1.0, "done")
     return [equations()]
@@ -183,7 +183,7 @@ def _verdict_table(result: Reproduction, statistics: Mapping[str, Statistic], ru
 
 
 def _mark_table(result: Reproduction) -> Table:
-    """What the same rules make of every method."""
+    """The numbers of the same statistics for every method."""
     rows = []
     for name in WHAT:
         cells = [interval(number(result.raced, one, name), 2) for one in (*ROWS.values(), BANK)]
@@ -199,8 +199,8 @@ def _claim_table(result: Reproduction) -> Table:
         for one in claims(result.raced)
     ]
     return Table(
-        f"What the text says: errors of one over the other's, on the same seeds; better is below {BETTER:g}, decided after a "
-        "first look, and at first any lead",
+        f"The claims of the text: errors of one method over the other's, on the same seeds; better is below {BETTER:g}, decided "
+        "after a first look, and at first any lead",
         ("claim", "of", "over", "ratio", "verdict", "verdict at first"),
         rows,
     )
@@ -242,7 +242,7 @@ def _log_table(result: Reproduction) -> Table:
         ("the other half's choice", logged.crossed_rmse, logged.crossed_rmse / BEST, *_crossed_rmse(logged), chosen),
     ]
     return Table(
-        f"Real log, {logged.rows} rows that nothing was fitted to: {logged.source}",
+        f"Real log, {logged.rows} rows to which nothing was fitted: {logged.source}",
         ("method", "sideslip RMSE, degrees", f"over {BEST:g}", "first half", "second half", "what it is"),
         rows,
     )

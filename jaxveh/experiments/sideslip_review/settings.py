@@ -1,4 +1,4 @@
-"""What the review says, and what our drives, sensors and filters assume."""
+"""The review's statements, and the assumptions of our drives, sensors and filters."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ MARKS = {
 """The review's one table, circles (True) and crosses (False): direct integration, nonlinear dynamic estimation."""
 
 MARKED = ("integration", "EKF")
-"""Which of our estimators stand for the two columns."""
+"""Our estimators for the two columns."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Scenario:
-    """What happens on a drive.
+    """The settings of a drive.
 
-    `steer` (rad, standard deviation at the road wheels), `pace` (-): how many times as fast as the ordinary steering;
+    `steer` (rad, standard deviation at the road wheels), `pace` (-): frequency of the steering over the ordinary one;
     `friction` (-) of the road's second half over that of its first; `bank` (rad, standard deviation along the way); `offset`
-    and `spread` (-): how many times the ordinary offsets of the inertial sensors, and errors of the car's parameters.
+    and `spread` (-): offsets of the inertial sensors and errors of the car's parameters, as multiples of the ordinary ones.
     """
 
     steer: float = 0.012
@@ -65,17 +65,17 @@ SCENARIOS = {
     "transient": Scenario(pace=6.0),
     "bank": Scenario(bank=0.03),
 }
-"""The review's rows, and banked roads, of which its text speaks. Each changes one thing of the first. A long run is the end of
-the first against its beginning."""
+"""The review's rows, and banked roads, which are only in its text. Each changes one thing of the first. For a long run the
+end of the first is compared with its beginning."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Noise:
-    """What the filters take for noise: process noise in unit per root second, measurement noise in the channel's unit.
+    """The noise of the filters' models: process noise in unit per root second, measurement noise in the channel's unit.
 
-    Those of the greatest likelihood on mixed drives, ordinary and at the limit, of other keys than the study's (so that the
-    truth has no part in them), none of the measurements' below the sensors' own. `linear`, `nonlinear`: the single tracks;
-    `kinematic`: v_x and v_y driven by the accelerometers; `handling`: the library's model with errors as states.
+    The levels are those of the greatest likelihood on mixed drives, ordinary and at the limit, of other keys than the
+    study's, so that the truth is not used; no measurement noise is below the sensor's own. `linear`, `nonlinear`: the single
+    tracks; `kinematic`: v_x and v_y driven by the accelerometers; `handling`: the library's model with errors as states.
     """
 
     linear: Levels = (("sideslip", 0.01), ("yaw_rate", 0.09), ("seen_yaw_rate", YAW_RATE), ("seen_a_y", A_Y))
@@ -89,31 +89,30 @@ class Noise:
 
 @dataclasses.dataclass(frozen=True)
 class Study:
-    """Drives, sensors, filters; nothing of it is printed.
+    """Drives, sensors, filters; none of these numbers is printed in the review.
 
     Drives: `speed` m/s held by the driver, random steering between `lowest` and `highest` Hz (times the scenario's pace),
     `duration` s, rows every `dt` s, `max_step` s of the simulation. Scored are the beginning, from `warm_up` to `span` s, and
     the end, the last `span` s. The road: banks of `bank_length` m; friction changes after half the way.
 
-    The truth is a car of seven degrees of freedom, the library's electric car with a motor in each wheel. Its tyres are Magic
-    Formulas of the shape `C` and `E` with the friction `peak_friction`, stretched by load and friction (Pacejka's similarity;
-    stiffest at `stiffest` times the load at rest, `slip_stiffness` times as stiff along as across), which relax over
-    `relaxation` m. Parameters are off from the data sheet's by draws (standard deviations, relative): `stiffness` of each
-    axle, `grip`, `mass`, `yaw_inertia`; `place` (m): of the centre of gravity. The filters know the data sheet's car, on
-    axles of its cornering stiffnesses and else ordinary shape (C 1.3, E -0.5, friction 1, force proportional to load).
-
-    Sensors: noises of `yaw_rate` rad/s, `a_x` and `a_y` m/s^2, `v_x` m/s; what is left of their offsets after zeroing at
+    The truth is a car of seven degrees of freedom, the library's electric car with a motor in each wheel. Its tyres are
+    Magic Formulas of the shape `C` and `E` with the friction `peak_friction`, scaled by load and friction (Pacejka's
+    similarity; stiffest at `stiffest` times the load at rest, `slip_stiffness` times as stiff along as across), which relax
+    over `relaxation` m. The true parameters differ from the data sheet by draws (standard deviations, relative): `stiffness`
+    of each axle, `grip`, `mass`, `yaw_inertia`; `place` (m): of the centre of gravity. The filters have the data sheet's
+    car, on axles of its cornering stiffnesses and otherwise ordinary shape (C 1.3, E -0.5, friction 1, force proportional to
+    load). Sensors: noises of `yaw_rate` rad/s, `a_x` and `a_y` m/s^2, `v_x` m/s; their remaining offsets after zeroing at
     standstill, drawn with standard deviations `yaw_rate_offset`, `a_offset`; the steering's offset, `steer_offset` rad.
 
     Observers: `poles` 1/s; `share` of the sliding observer's gain that is linear, and the `boundary` of its switching in
     rad/s and m/s^2; `pseudo_time` s of the pseudo-integration; `switch_at` m/s^2 of lateral
     acceleration, the end of a tyre's linear range; `particles`.
 
-    Verdicts: what is good is an error of at most `share_limit` of sideslip's own root mean square, or one that grows at most
-    `growth_limit` times where something is disturbed. Both were chosen before the numbers were seen. That fast transients are
-    judged by the fast part of the error alone was decided after a first look, where drift hid what the row asks.
+    Verdicts: an error is good if it is at most `share_limit` of sideslip's own root mean square, or if a disturbance increases it
+    at most by the factor `growth_limit`. Both were chosen before the numbers were seen. That fast transients are judged by the
+    fast part of the error alone was decided after a first look, in which drift hid the transients.
 
-    What flatters integration here: a car without roll, whose accelerometer leans on banks alone.
+    Integration has an advantage here: a car without roll, whose accelerometer leans only on banks.
     """
 
     speed: float = 25.0

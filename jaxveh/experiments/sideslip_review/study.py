@@ -1,4 +1,4 @@
-"""The runs: drives once, then every method on the same drives."""
+"""The runs: each drive once, then every method on the same drives."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ EVERY = 10
 """Rows between those of the courses that are kept."""
 
 SLOW = 2.0
-"""s: what is left after a mean over them is fast."""
+"""s of the moving mean; the remainder is the fast part."""
 
 
 class Raced(NamedTuple):
-    """One study: the `drives`, (scenarios, seeds, T) each, and what the methods made of them: by method's name, by metric,
-    (scenarios, seeds, ...)."""
+    """One study: the `drives`, (scenarios, seeds, T) each, and the results of the methods, `found`: by method's name, by
+    metric, (scenarios, seeds, ...)."""
 
     study: Study
     scenarios: tuple[str, ...]
@@ -47,7 +47,8 @@ def drives_of(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> Drive:
-    """Drives of the scenarios, one a seed: (scenarios, seeds, T). A seed steers alike in all of one pace, with one car."""
+    """Drives of the scenarios, one per seed: (scenarios, seeds, T). A seed has the same steering in all scenarios of one
+    pace, and one car."""
     check_whole("seeds", seeds, 2)
     run = lambda point, key: drive_once(study, scenario_at(point.scenario), key)
     found = stores.sweep("drives", run, _design(scenarios), seeds, key, progress=progress)
@@ -99,8 +100,9 @@ def _score(study: Study, group: Group):
 
 
 def metrics(study: Study, found: Found, drive: Drive) -> dict[str, Any]:
-    """Root mean squares in degrees of sideslip's error and of sideslip itself (`of_`): over the beginning (`early`), over the
-    end (`late`), and of what is fast in the beginning (`fast`); whether the run `failed`; the `course` of the estimate."""
+    """Root mean squares in degrees of sideslip's error and of sideslip itself (`of_`): over the beginning (`early`), over
+    the end (`late`), and of the fast part in the beginning (`fast`); whether the run `failed`; the `course` of the
+    estimate."""
     sideslip = jnp.arctan2(found.v_y, drive.v_x)
     wrong, true = jnp.rad2deg(sideslip - drive.sideslip), jnp.rad2deg(drive.sideslip)
     time = drive.time - drive.time[0]
@@ -120,7 +122,7 @@ def metrics(study: Study, found: Found, drive: Drive) -> dict[str, Any]:
 
 
 def fast_part(values, window: int):
-    """The values (T,) less their mean over `window` rows about each; at either end the mean is over fewer."""
+    """The values (T,) less their mean over `window` rows about each; near either end the mean is over fewer rows."""
     total = jnp.pad(jnp.cumsum(values), (1, 0))
     rows = jnp.arange(values.shape[0])
     low, high = jnp.maximum(rows - window // 2, 0), jnp.minimum(rows + window // 2 + 1, values.shape[0])

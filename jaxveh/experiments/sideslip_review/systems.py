@@ -1,4 +1,4 @@
-"""Every method, equation, table and claim of the review (Chen, Gao & Xu 2013), and who has it here."""
+"""Every method, equation, table and claim of the review (Chen, Gao & Xu 2013), and its place in this package."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LATERAL = (
         "1.2 [11-13]",
         (),
         "no device: an axle's or a wheel's force is an output of every car (`F_yf`, `F_y_fl`), and a channel of that name can be "
-        "observed; how such a hub errs is in none of the five papers",
+        "observed; the errors of such a hub are in none of the five papers",
     ),
     System("single track", "1.2.1 [16-18]", ("vehicles.SingleTrack", *_ways("sideslip", "linear_kalman", "ekf"))),
     System(
@@ -40,9 +40,9 @@ LATERAL = (
     System("exponential", "eq 6", ("tyres.Exponential", *_ways("sideslip", "ukf_exponential"))),
     System("arctangent", "eq 7", ("tyres.Arctangent", *_ways("sideslip", "ukf_arctangent"))),
     System("UniTire", "1.2.2 [26]", ("tyres.UniTire", *_ways("sideslip", "ukf_unitire"))),
-    System("linear tyre, its stiffness adapted", "1.2.2 [7, 29]", _ways("sideslip", "adapted_stiffness", "adaptive")),
-    System("steady turn, of steer", "eq 1", _ways("sideslip", "steady_steer")),
-    System("steady turn, of yaw rate and a_y", "eq 2", _ways("sideslip", "steady_turn")),
+    System("linear tyre with adapted stiffness", "1.2.2 [7, 29]", _ways("sideslip", "adapted_stiffness", "adaptive")),
+    System("steady turn, from steer", "eq 1", _ways("sideslip", "steady_steer")),
+    System("steady turn, from yaw rate and a_y", "eq 2", _ways("sideslip", "steady_turn")),
     System(
         "tyre forces as states that walk",
         "1.2.2 [30]",
@@ -51,7 +51,7 @@ LATERAL = (
     ),
     System("aligning torque to front force to slip angle", "1.2.3 [37, 38]", _ways("sideslip", "steering_torque")),
     System("switch", "1.3.1 [40]", _ways("sideslip", "switched")),
-    System("weighed by covariances", "1.3.1 [41]", _ways("sideslip", "weighted")),
+    System("weighted by covariances", "1.3.1 [41]", _ways("sideslip", "weighted")),
     System("pseudo-integration", "1.3.1 [40, 42, 43]", _ways("sideslip", "pseudo_integration")),
     System(
         "satellites and inertial unit, with biases",
@@ -64,7 +64,7 @@ LATERAL = (
         "satellites with a reference station",
         "1.3.2 [52, 53]",
         ("sensors.GNSS",),
-        "no carrier phases: `sensors.GNSS` with a centimetre's noise stands for their solution",
+        "no carrier phases: `sensors.GNSS` with a noise of a centimetre replaces their solution",
     ),
     System(
         "camera and dynamics, at several rates",
@@ -79,17 +79,19 @@ OBSERVERS = (
         "Kalman filter",
         "1.4.1 [17, 57]",
         ("filters.Kalman", *_ways("sideslip", "linear_kalman")),
-        "[57]'s tyre pressure: no pressure enters a single track",
+        "the tyre pressure of [57]: no pressure enters a single track",
     ),
     System("Luenberger observer", "1.4.2", ("observers.Luenberger", *_ways("sideslip", "luenberger"))),
-    System("extended Luenberger observer, gain by the state", "1.4.2 [58]", _ways("sideslip", "state_dependent_gain")),
+    System(
+        "extended Luenberger observer, gain from the state", "1.4.2 [58]", _ways("sideslip", "state_dependent_gain")
+    ),
     System("observer with a linear error", "1.4.2 [59]", _ways("sideslip", "error_linearising")),
     System(
-        "sliding mode, smooth as eq 9",
+        "sliding mode, smooth as in eq 9",
         "1.4.3, eq 9 [60-62]",
         ("observers.SlidingMode", *_ways("sideslip", "sliding_mode")),
     ),
-    System("gain that is blind to a disturbance", "1.4.4 [21, 65]", _ways("sideslip", "decoupled")),
+    System("gain that is insensitive to a disturbance", "1.4.4 [21, 65]", _ways("sideslip", "decoupled")),
     System("H-infinity", "1.4.4 [66, 67]", ("filters.HInfinity", *_ways("sideslip", "h_infinity"))),
     System("unscented filter", "1.4.5 [68-71]", ("filters.Unscented", *_ways("sideslip", "ukf"))),
     System(
@@ -119,10 +121,10 @@ SPEED = (
     ),
     System("adaptive nonlinear filter under ABS", "2.1 [19, 87]", _ways("speed", "adaptive_nonlinear")),
     System("integral of a_x, its offset from the wheels", "2.1 [88, 89]", _ways("speed", "accelerometer")),
-    System("wheels and accelerometer weighed", "2.1 [90-92]", _ways("speed", "weighted")),
+    System("wheels and accelerometer, weighted", "2.1 [90-92]", _ways("speed", "weighted")),
     System("fuzzy rules", "2.1 [93]", _ways("speed", "fuzzy")),
-    System("force of the brakes' pressure", "2.2, eq 11 [2, 94, 95]", _ways("speed", "brake_force")),
-    System("force of the motors' torque", "2.3, eq 12 [34, 83, 96]", _ways("speed", "motor_force")),
+    System("force from the brakes' pressure", "2.2, eq 11 [2, 94, 95]", _ways("speed", "brake_force")),
+    System("force from the motors' torque", "2.3, eq 12 [34, 83, 96]", _ways("speed", "motor_force")),
     System("speed among the states of a car", "2.2", ("vehicles.TwoTrack3DOF", *_ways("sideslip", "roll_4dof"))),
 )
 
@@ -142,12 +144,12 @@ PARAMETERS = (
     System(
         "parameters of a tyre by a filter", "3.1.1 [129-132]", ("statespace.with_parameters", "experiments.tyre_apf")
     ),
-    System("filters that hand each other results", "3.1.1.2", ("filters.interleave", "estimators.Exchange")),
+    System("filters that exchange results", "3.1.1.2", ("filters.interleave", "estimators.Exchange")),
     System(
-        "road seen before the wheel; sound and strain of the tread",
+        "road ahead of the wheel; sound and strain of the tread",
         "3.1.2.1.1 [107-111]",
         (),
-        "sensors on the road or in the tyre, whose signals no vehicle model makes",
+        "sensors on the road or in the tyre, whose signals no vehicle model has",
     ),
     System("friction by slip slope", "3.1.2.1 [112-116]", _ways("friction", "slip_slope")),
     System("friction by a lateral tyre curve", "3.1.2.1", _ways("friction", "lateral_curve", "bank")),
@@ -170,9 +172,9 @@ PARAMETERS = (
     System("bank as an unknown input", "3.1.2.3 [126]", _ways("bank", "unknown_input")),
     System("bank by Tseng's rule", "3.1.2.3 [123]", _ways("bank", "tseng")),
     System("grade by a filter", "3.1.2.3 [124, 127]", _ways("grade", "kinematic", "filter", "joint")),
-    System("grade by satellites", "3.1.2.3 [128]", _ways("grade", "satellite", "climb")),
+    System("grade from satellites", "3.1.2.3 [128]", _ways("grade", "satellite", "climb")),
     System("roll", "1.1", _ways("roll", "gyro", "steady", "springs", "six_axis", "filter")),
-    System("place of the centre of gravity", "3.1.2.4, eq 17 [133]", _ways("geometry", "learner")),
+    System("position of the centre of gravity", "3.1.2.4, eq 17 [133]", _ways("geometry", "learner")),
     System("mass", "3.1.2.4 [129-135]", _ways("mass", "gated", "forgetting", "filter")),
     System("yaw inertia, steering", "3.1.2.4", _ways("geometry", "learner")),
 )
@@ -180,7 +182,7 @@ PARAMETERS = (
 CLAIMS = (
     System("the table of seven rows", "table 1", ("experiments.sideslip_review.verdicts.ROWS",)),
     System(
-        "equations 1, 2, 4, 5, 15, 17 as printed and as they should be",
+        "equations 1, 2, 4, 5, 15, 17 as printed and corrected",
         "1 to 3",
         ("experiments.sideslip_review.printed.equations",),
     ),

@@ -1,4 +1,4 @@
-"""The review's circles and crosses, and what its text claims, as numbers with intervals and verdicts."""
+"""The review's circles and crosses, and the claims of its text, as numbers with intervals and verdicts."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ SUPPORTS, CONTRADICTS, OPEN = "supports", "contradicts", "cannot tell"
 
 
 class Statistic(NamedTuple):
-    """What stands for a row: the median over seeds of `metric` in a scenario over `reference`, (metric, scenario).
+    """The statistic of a row: the median over seeds of `metric` in a `scenario` over `reference`, (metric, scenario).
 
-    With the reference's metric `of_...` it is a share of sideslip itself, else by how much an error has grown. `what`: in words.
+    If the reference's metric is `of_...`, it is a share of sideslip itself, otherwise the growth of an error. `what`: a
+    description.
     """
 
     metric: str
@@ -53,15 +54,15 @@ FIRST_ROWS = ROWS | {
         "early", "transient", ("of_early", "transient"), "error over sideslip, fast steering"
     ),
 }
-"""As they were set before any number was seen: that transients are judged by the fast part alone came after a first look."""
+"""The statistics as set before any number was seen; the fast part alone for transients was decided after a first look."""
 
 BANK = Statistic("early", "bank", ("early", "normal"), "error over that on a level road")
-"""Of the bank, which the table does not name and the text does."""
+"""The statistic of the bank, which is not in the table but in the text."""
 
 
 class Verdict(NamedTuple):
-    """One cell: its row with the statistic that stands for it and its column, the review's mark (True: circle), the number with
-    its interval, its limit, the verdict."""
+    """One cell: its `row` with its `statistic` and its column (`method`), the review's `mark` (True: circle), the number
+    `found` with its interval, its `limit`, the `verdict`."""
 
     row: str
     statistic: Statistic
@@ -83,13 +84,13 @@ class Claim(NamedTuple):
 
 
 DECADE = 10**0.5
-"""Within this factor either way, errors are of one order of magnitude."""
+"""Errors within this factor, up or down, are of one order of magnitude."""
 
 
 BETTER = 0.95
-"""An error that is smaller by less than a twentieth is no smaller error. Decided after a first table of 20 seeds, in which
-unscented and particle filters led by a hundredth or two: without it their claims would be supported, or be told from nothing.
-So claims are judged without it, too."""
+"""A ratio of errors above this counts as no improvement: the error must be smaller by a twentieth at least. Decided after a
+first table of 20 seeds, in which unscented and particle filters led by a hundredth or two: without this limit their claims
+would be supported, or left undecided. The claims are therefore also judged without it."""
 
 
 def _claim(text: str, scenario: str, a: str, b: str, low: float = 0.0, high: float = BETTER) -> Claim:
@@ -100,21 +101,21 @@ CLAIMS = (
     _claim("at the limit nonlinear tyres are better than linear ones", "limit", "EKF", "linear Kalman"),
     _claim("observers of one model and one sensor set are of one order", "limit", "Luenberger", "EKF", 1 / DECADE, DECADE),
     _claim("observers of one model and one sensor set are of one order", "limit", "sliding mode", "EKF", 1 / DECADE, DECADE),
-    _claim("UKF is better than EKF where things are strongly nonlinear", "limit", "UKF", "EKF"),
+    _claim("UKF is better than EKF in strongly nonlinear cases", "limit", "UKF", "EKF"),
     _claim("PF is better than EKF", "limit", "PF", "EKF"),
     _claim("UPF is the best of UPF, UKF and EKF", "limit", "UPF", "UKF"),
     _claim("UPF is the best of UPF, UKF and EKF", "limit", "UPF", "EKF"),
-    _claim("pseudo-integration bears sensor bias better than integration", "sensor bias", "pseudo-integration", "integration"),
-    _claim("pseudo-integration bears banks better than integration", "bank", "pseudo-integration", "integration"),
-    _claim("pseudo-integration bears model errors better than the model", "parameters", "pseudo-integration", "EKF"),
+    _claim("pseudo-integration handles sensor bias better than integration", "sensor bias", "pseudo-integration", "integration"),
+    _claim("pseudo-integration handles banks better than integration", "bank", "pseudo-integration", "integration"),
+    _claim("pseudo-integration handles model errors better than the model", "parameters", "pseudo-integration", "EKF"),
     Claim(
-        "pseudo-integration does not rid a_y of its bias", ("early", "pseudo-integration", "sensor bias"),
+        "pseudo-integration does not remove the bias of a_y", ("early", "pseudo-integration", "sensor bias"),
         ("early", "pseudo-integration", "normal"), 1.0 / BETTER, float("inf"),
     ),
-    _claim("weighted fusion bears sensor bias better than kinematics", "sensor bias", "weighted", "kinematic Kalman"),
-    _claim("weighted fusion bears model errors better than the model", "parameters", "weighted", "EKF"),
+    _claim("weighted fusion handles sensor bias better than kinematics", "sensor bias", "weighted", "kinematic Kalman"),
+    _claim("weighted fusion handles model errors better than the model", "parameters", "weighted", "EKF"),
 )  # fmt: skip
-"""What the text says of methods, ours for those that it names."""
+"""The text's claims about methods, with ours in place of those that it names."""
 
 
 def number(raced: Raced, statistic: Statistic, method: str) -> ConfidenceInterval:
@@ -124,12 +125,12 @@ def number(raced: Raced, statistic: Statistic, method: str) -> ConfidenceInterva
 
 
 def limit_of(study: Study, statistic: Statistic) -> float:
-    """At most this much is good."""
+    """The largest good value."""
     return study.share_limit if statistic.is_share else study.growth_limit
 
 
 def judge(found: ConfidenceInterval, low: float, high: float, expected: bool = True) -> str:
-    """Whether the number is within the bounds as expected; nobody can tell where its interval has one of them inside."""
+    """Whether the number is within the bounds as expected; it cannot be decided if a bound lies inside its interval."""
     if not np.isfinite([found.value, found.low]).all():
         inside = None if np.isnan(found.value) else False
     elif found.low >= low and found.high <= high:
@@ -154,7 +155,7 @@ def verdicts(raced: Raced, rows: Mapping[str, Statistic] = ROWS) -> list[Verdict
 
 
 class Judged(NamedTuple):
-    """A claim with its number, its verdict, and the verdict by any lead at all."""
+    """A claim with its number, its verdict, and the verdict for any lead at all."""
 
     claim: Claim
     ratio: ConfidenceInterval

@@ -35,5 +35,5 @@ __all__ = [
     "tyres",
 ]
 
-# What draws needs matplotlib, which is an extra.
+# The figures need matplotlib, which is an extra.
 __getattr__ = submodules(__name__, ("figures",))

@@ -1,4 +1,4 @@
-"""Pictures over time: parameters, the lane change and the step steer with estimated tyres."""
+"""Figures over time: parameters, the lane change and the step steer with estimated tyres."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ FILTERS = {"PF": kit.CYCLE[0], "APF": kit.CYCLE[3], "UKF": kit.CYCLE[2]}
 """The filters of the tracks and their colours."""
 
 TYRES = {"prior": "#7f7f7f", "PF": kit.CYCLE[0], "APF": kit.CYCLE[3], "MAP": kit.CYCLE[2]}
-"""Whose tyres drive the lane change and the step steer."""
+"""The estimators whose tyres are used in the lane change and the step steer, with their colours."""
 
 UNITS = {"B": "1/rad", "C": "-", "D": "kN", "E": "-"}
-"""As parameters are shown."""
+"""Units in which parameters are shown."""
 
 SHOWN = {
     "yaw_rate": ("yaw rate [°/s]", np.rad2deg(1.0)),
@@ -32,8 +32,8 @@ SHOWN = {
 
 
 def tracks_figure(tracks: Tracks, truth: np.ndarray, seed: int = 0, figure: Any = None) -> Any:
-    """The eight parameters of seed number `seed` over time, as figures 6 to 13 of the paper: filters' means, the prior's mean,
-    the `truth` (8,)."""
+    """The eight parameters of seed number `seed` over time, as in figures 6 to 13 of the paper: the filters' means, the
+    prior's mean, the `truth` (8,)."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 7.2), layout="constrained") if figure is None else figure
     with style():
         every = figure.subplots(4, 2, sharex=True)
@@ -53,7 +53,7 @@ def tracks_figure(tracks: Tracks, truth: np.ndarray, seed: int = 0, figure: Any 
 
 
 def lane_change_figure(result: Reproduction, seed: int = 0, figure: Any = None) -> Any:
-    """The lane change of seed number `seed` driven without measurements by the estimated tyres, as figures 14 to 16."""
+    """The lane change of seed number `seed` without measurements, with the estimated tyres, as in figures 14 to 16."""
     drive = result.outcome.drive
     time = np.asarray(drive.time)[seed]
     courses = {"truth": {name: np.asarray(drive[f"true.{name}"])[seed] for name in ("yaw_rate", "yaw", "v_y")}}
@@ -62,7 +62,7 @@ def lane_change_figure(result: Reproduction, seed: int = 0, figure: Any = None) 
 
 
 def step_figure(result: Reproduction, seed: int = 0, figure: Any = None) -> Any:
-    """The step steer of 5 degrees with the tyres of seed number `seed`, as figures 19 to 23."""
+    """The step steer of 5 degrees with the tyres of seed number `seed`, as in figures 19 to 23."""
     names = ("yaw_rate", "yaw", "v_y", "F_yf", "F_yr")
     courses = {
         one: dict(zip(STEP_OUTPUTS, np.asarray(result.first_step[one])[seed], strict=True)) for one in ("truth", *TYRES)
@@ -81,7 +81,7 @@ def _courses(time: np.ndarray, courses: dict, names: tuple[str, ...], what: str,
             for one, course in courses.items():
                 dashed = {"linestyle": "--"} if one == "truth" else {}
                 colour = COLOURS["truth"] if one == "truth" else TYRES[one]
-                # The truth over all of them, so that it is seen where they agree.
+                # The truth on top of all, so that it is visible where they agree.
                 order = 3 if one == "truth" else 2
                 axes.plot(time, scale * course[name], color=colour, label=one, zorder=order, **dashed)
             axes.set(ylabel=label)

@@ -1,4 +1,4 @@
-"""What the criteria rest on: what each assumes, and who was told what."""
+"""The terms of the criteria: their assumptions, and who was told what."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from jaxveh.experiments.tyre_apf.saturated import SWEEP
 from jaxveh.experiments.tyre_apf.settings import LEVELS, STEP_STEER
 
 _LANE = (
-    "median over the drives; the truth is the filter's own single track, its mass and inertia told, and the sensors' noise; "
-    "priors of 10 % about other tyres; process noise by the filters' likelihood on other drives"
+    "median over the drives; the truth is the filter's own single track, whose mass and inertia it is told, and the sensors' "
+    "noise; priors of 10 % about other tyres; process noise by the filters' likelihood on other drives"
 )
-_BOUND = "the truth is the filter's own car; what one drive can tell, whoever estimates"
-_SWEEP = _LANE + "; steering runs linearly between rows, only D and B unknown"
+_BOUND = "the truth is the filter's own car; the information in one drive, for any estimator"
+_SWEEP = _LANE + "; steering is linear between rows, only D and B unknown"
 _SHARP = (
     _LANE
     + "; 300 particles, multinomial resampling, one process noise for both filters by the sum of their likelihoods"
 )
 _KNOWS = (
     _LANE
-    + "; 300 particles, multinomial resampling, the auxiliary filter looks ahead with the process noise, not to a point as the "
-    "paper's; one process noise for both filters by the sum of their likelihoods, chosen anew (`predictive`); made after the "
-    "paper's had missed three"
+    + "; 300 particles, multinomial resampling; the auxiliary filter looks ahead with the process noise, the paper's to a point; "
+    "one process noise for both filters by the sum of their likelihoods, chosen again (`predictive`); introduced after the "
+    "paper's filter had missed three criteria"
 )
 AHEAD = "APF that knows the process noise"
 """The name of that filter in the criteria."""
 
-_PRINTED = "the paper's own rule, which looks at the truth: nothing is filtered"
+_PRINTED = "the paper's own rule, which uses the truth: nothing is filtered"
 
 _AXES = ("yaw", "yaw-rate")
 WHERE = [f"yaw rate {level.yaw_rate:g} rad/s, a_y {level.a_y:g} m/s^2" for level in LEVELS]
-"""The levels of the sensors' noise in words."""
+"""The levels of the sensors' noise, as text."""
 
 
 def _of(name: str) -> list[str]:
@@ -49,7 +49,7 @@ def _of(name: str) -> list[str]:
 
 
 def _ahead_of(name: str) -> dict[str, Terms]:
-    """The criterion of the paper's filter, and beside it that of the one that knows the process noise."""
+    """The criterion of the paper's filter, followed by that of the one that looks ahead with the process noise."""
     return {name: Terms(_SHARP), name.replace("APF", AHEAD): Terms(_KNOWS, name)}
 
 

@@ -1,4 +1,4 @@
-"""The study's pictures: force curves, parameters, states of one seed."""
+"""The study's figures: force curves, parameters, states of one seed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS, Outcome, with_
 from jaxveh.experiments.tyre_apf.sweep_figures import saturated_figure, sharpness_figure
 
 NAMES = tuple(field.replace("_", ".") for field in FIELDS)
-"""The parameters as people write them, `front.B`."""
+"""The parameters as they are written in text, `front.B`."""
 
 
 def figures(result: Reproduction) -> dict[str, Any]:
@@ -42,7 +42,7 @@ def truth() -> np.ndarray:
 
 
 def true_spread(study: Study) -> np.ndarray:
-    """The prior's standard deviations at the truth (8,), physical: the scale on which parameters are compared."""
+    """The prior's standard deviations at the truth (8,), physical: the scale for comparing parameters."""
     car = vehicles.passenger_car()
     chosen = resolve(car, tyres)
     values = pick(car, chosen)
@@ -75,7 +75,7 @@ def curves_figure(outcome: Outcome, study: Study, seed: int = 0, figure: Any = N
 
 
 def parameters_figure(outcome: Outcome, study: Study, seed: int = 0, figure: Any = None) -> Any:
-    """Parameters of seed number `seed` against the truth, in units of the prior's spread."""
+    """Parameters of seed number `seed` against the truth, in units of the prior's standard deviation."""
     named = lambda values: dict(zip(NAMES, values, strict=True))
     mean = {name: named(outcome.parameters[name][seed]) for name in ESTIMATORS}
     std = {name: named(outcome.spread[name][seed]) for name in ESTIMATORS}
@@ -83,7 +83,7 @@ def parameters_figure(outcome: Outcome, study: Study, seed: int = 0, figure: Any
 
 
 def states_figure(found: Staged, seed: int = 0, labels: tuple[str, ...] = ("UKF", "APF"), figure: Any = None) -> Any:
-    """States of seed number `seed`: the filters' means and bands, the truth, and the prior's tyres without measurement."""
+    """States of seed number `seed`: the filters' means and bands, the truth, and the prior's tyres without measurements."""
     pick_seed = lambda tree: jax.tree.map(lambda leaf: leaf[seed], tree)
     drive = found.outcome.drive
     names = ("v_y", "sideslip", "yaw_rate")

@@ -1,10 +1,10 @@
-"""The noise that the study's filters assume, chosen by their own likelihood on drives that no table shows.
+"""The noise of the study's filters, chosen by their own likelihood on drives that are in no table.
 
     python -m jaxveh.experiments.tyre_apf.noise
 
-prints what `settings.Study` holds: for each filter the candidate whose log-likelihood, summed over the drives, is largest; and
-what `settings.LEVELS` holds: what both particle filters share at each level as they are compared there, resampling
-multinomially. The truth has no part in it.
+prints the numbers of `settings.Study`: for each filter the candidate whose log-likelihood, summed over the drives, is
+largest; and those of `settings.LEVELS`: the noise that both particle filters share at each level, with multinomial
+resampling as in their comparison. The truth is not used.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from jaxveh.experiments.tyre_apf.study import drive_once, filter_of, guess_once,
 from jaxveh.sweeps import IN_MEMORY, Stores
 
 V_Y = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
-"""Candidates: m/s,"""
+"""Candidates: m/s per root second."""
 
 YAW_RATE = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
-"""rad/s,"""
+"""Candidates: rad/s per root second."""
 
 WALK = (0.01, 0.02, 0.05, 0.1, 0.2)
-"""and relative, all per root second."""
+"""Candidates: relative, per root second."""
 
 
 class Round(NamedTuple):
-    """Of a choice: how many `drives`, and how often each filter goes over each of them, `again`."""
+    """One round of a choice: the number of `drives`, and how often each filter runs over each of them, `again`."""
 
     drives: int
     again: int
@@ -47,13 +47,13 @@ class Round(NamedTuple):
 LEVEL_CANDIDATES = np.array(
     list(itertools.product((0.005, 0.01, 0.02, 0.05, 0.1), (0.001, 0.002, 0.005, 0.01), (0.01, 0.02, 0.05, 0.1)))
 )
-"""(m, 3): as above, for the levels. A walk of 0.2 with the best of the rest is worse at each of them, by 60 to 1300."""
+"""(m, 3): the same for the levels. A walk of 0.2 with the best of the rest is worse at each of them, by 60 to 1300."""
 
 ROUNDS = (Round(drives=8, again=3), Round(drives=40, again=4))
-"""All of them first, then the best on more drives,"""
+"""First all candidates, then the best on more drives."""
 
 KEEP = 12
-"""so many of them."""
+"""The number of candidates kept after a round."""
 
 
 class Choice(NamedTuple):
@@ -65,10 +65,10 @@ class Choice(NamedTuple):
 
 
 def choose(study: Study, name: str, *, drives: int = 8, seed: int = 1000, progress: Progress = silent) -> Choice:
-    """Choose the noise of the filter `PF`, `APF` or `UKF` on drives of their own seeds, by its likelihood alone.
+    """Choose the noise of the filter `PF`, `APF` or `UKF` on drives with their own seeds, only by its likelihood.
 
-    `seed` differs from the report's, so that no drive is used twice. A parameter that walks is for particles only: the
-    unscented filter's parameters are constants. A candidate for which the filter fails on any drive is out.
+    `seed` differs from the report's, so that no drive is used twice. Only particle filters have parameters that walk: the
+    unscented filter's parameters are constants. A candidate with which the filter fails on any drive is excluded.
     """
     walks = (0.0,) if name == "UKF" else WALK
     candidates = np.array(list(itertools.product(V_Y, YAW_RATE, walks)))
@@ -95,16 +95,17 @@ def choose_level(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> Choice:
-    """Choose what both particle filters assume at a level of the sensors' noise, resampling as the paper does: the candidate with
-    the largest mean of their log-likelihoods, over every pass of each drive. One with which a filter fails is out.
+    """Choose the process noise of both particle filters at a level of the sensors' noise, with the paper's resampling: the
+    candidate with the largest mean of their log-likelihoods, over every pass of each drive. One with which a filter fails is
+    excluded.
 
-    A pass that explains its drive worse than the mean and the spread of what was measured do (`unexplained_likelihood`) is
-    lost, and counts as that. With sharp sensors 300 particles lose some drives whatever they assume: how badly (log-likelihoods
-    of -1e9 where
-    others have 4e3) would otherwise decide alone, while medians would not mind a third of all drives lost.
+    A pass whose likelihood is lower than that of the measurements' mean and standard deviation alone
+    (`unexplained_likelihood`) is lost, and counts with the latter. With sharp sensors 300 particles lose some drives with
+    any noise: how badly (log-likelihoods of -1e9 where others have 4e3) would otherwise decide alone, while medians would
+    ignore a third of all drives lost.
 
-    `kinds`: the filters, by default the paper's. Each of the `rounds` (at least one) takes the `keep` best of the one before to
-    drives of its own, and the last is returned.
+    `kinds`: the filters, by default the paper's. Each of the `rounds` (at least one) takes the `keep` best of the one before
+    to drives of its own, and the last is returned.
     """
     check_at_least("number of rounds", len(rounds), 1)
     both = [kind(particles, numerics.multinomial) for kind in (KINDS if kinds is None else kinds).values()]
@@ -119,7 +120,8 @@ def choose_level(
 
 
 def unexplained_likelihood(drive: Recording) -> jax.Array:
-    """The greatest log-likelihood of the drive's measurements to which time, inputs and each other say nothing: normal ones."""
+    """The greatest log-likelihood of the drive's measurements as normal numbers, independent of time, inputs and each
+    other."""
     each = [len(drive[name]) * (jnp.log(2 * jnp.pi * jnp.var(drive[name])) + 1) / 2 for name in ("yaw_rate", "a_y")]
     return -jnp.sum(jnp.stack(each))
 
@@ -144,7 +146,7 @@ def _of_level(
     progress: Progress,
     stores: Stores,
 ) -> np.ndarray:
-    """Log-likelihoods (candidates, drives): both filters' means over passes, summed. `drives`: how many, from which seed."""
+    """Log-likelihoods (candidates, drives): both filters' means over passes, summed. `drives`: their number and their seed."""
     values = jnp.asarray(candidates)
 
     def run(point, key):
@@ -161,7 +163,7 @@ def _of_level(
 
 
 def _drives(study: Study, name: str, keys):
-    """The likelihood of every drive as a function of the noise's levels, compiled once."""
+    """The likelihood of every drive as a function of the noise levels, compiled once."""
 
     @eqx.filter_jit
     def simulate(keys):

@@ -1,8 +1,8 @@
-"""The paper's first conclusion: that Runge-Kutta makes a particle filter possible for a system of high order.
+"""The paper's first conclusion: Runge-Kutta makes a particle filter possible for a system of high order.
 
-A filter with no unknown tyre (three states) and with eight parameters (eleven), integrated by Runge-Kutta of order four and by
-Euler's rule. An integrator can spoil the prediction; the order asks of the particles that they cover eleven unknowns. Both are
-looked at apart.
+A filter without unknown tyre parameters (three states) and one with eight (eleven states), integrated by Runge-Kutta of
+order four and by Euler's rule. An integrator can spoil the prediction; the order requires the particles to cover eleven
+unknowns. The two effects are examined separately.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from jaxveh.statespace import RK4
 from jaxveh.sweeps import IN_MEMORY, Stores, Table, compare
 
 SOLVERS = {"Runge-Kutta 4": RK4, "Euler": diffrax.Euler}
-"""How the filter's model is integrated, one step a row; the drive itself is simulated finely."""
+"""Integrators of the filter's model, one step per row; the drive itself is simulated with finer steps."""
 
 CASES = {
     "3 states, rows of {long:g} s": (None, "long"),
     "11 states, rows of {long:g} s": (tyres, "long"),
     "11 states, rows of {short:g} s": (tyres, "short"),
 }
-"""What is unknown (no tyre, the prior's mean taken at its word, or all eight parameters), and the length of a row: the paper's,
-or the study's."""
+"""The unknowns (none, with the prior's mean taken as the tyres, or all eight parameters), and the length of a row: the
+paper's, or the study's."""
 
 
 def run_order(
@@ -47,8 +47,8 @@ def run_order(
     stores: Stores = IN_MEMORY,
 ) -> sweeps.Swept:
     """The particle filter with the paper's number of particles, by case and solver: `error` of the eight parameters in prior
-    standard deviations (of three states: the prior's) and `prior_error`, `v_y` (m/s) and `yaw_rate` (rad/s) RMSE, the effective
-    `share` of the particles, `result`."""
+    standard deviations (with three states that of the prior) and `prior_error`, `v_y` (m/s) and `yaw_rate` (rad/s) RMSE, the
+    effective `share` of the particles, `result`."""
     steps = {"long": printed.step, "short": 1.0 / study.rate}
     cases = {name.format(**steps): (order, steps[step]) for name, (order, step) in CASES.items()}
 
@@ -78,7 +78,7 @@ def values_of(car) -> jax.Array:
 
 
 def _model(study: Study, car, order, solver) -> Any:
-    """As `study.model_of`, with tyres that are unknown or taken at their word, and another solver."""
+    """The model of `study.model_of`, with tyres that are unknown or taken as certain, and another solver."""
     devices, noise = sensors.esc(yaw_rate=study.yaw_rate_std, a_y=study.a_y_std), study.particle
     process = {"v_y": noise.v_y, "yaw_rate": noise.yaw_rate}
     unknown: dict[str, Any] = {} if order is None else {"estimate": order, "prior": study.prior, "walk": noise.walk}
@@ -86,7 +86,7 @@ def _model(study: Study, car, order, solver) -> Any:
 
 
 def order_table(found: sweeps.Swept) -> Table:
-    """Errors by row, order and solver, and each over Runge-Kutta's."""
+    """Errors by row length, order and solver, and their ratios to Runge-Kutta's."""
     rows = []
     axis = lambda name: found.design.axis(name).labels
     for case in axis("case"):
@@ -99,7 +99,7 @@ def order_table(found: sweeps.Swept) -> Table:
                  interval(over), spread(100 * at("share"), 2), lost)
             )  # fmt: skip
     return Table(
-        f"What order and integrator do to the particle filter: median [quartiles] over {found.seeds} seeds, or ratio [95 %]",
+        f"Effect of order and integrator on the particle filter: median [quartiles] over {found.seeds} seeds, or ratio [95 %]",
         ("case", "integrator", "prior's error, its sd", "parameters' error, prior sd", "v_y, m/s", "yaw rate, rad/s",
          "v_y over Runge-Kutta's", "effective particles, %", "lost"),
         rows,

@@ -1,10 +1,10 @@
-"""The paper's comparison with an auxiliary filter that looks ahead with the process noise, not to a point.
+"""The paper's comparison with an auxiliary filter that looks ahead with the process noise instead of to a point.
 
     python -m jaxveh.experiments.tyre_apf.predictive
 
-chooses the noise of each level by the likelihood of the plain filter and of this one, as `noise` does for the paper's, then races
-both at it, on drives of another key than the report's, and prints what the report's criteria ask of the paper's filter. The
-report has the noise (`settings.LOOKING_AHEAD`) and races it on its own drives.
+chooses the noise of each level by the likelihood of the plain filter and of this one, as `noise` does for the paper's, then
+races both with it, on drives of another key than the report's, and prints the quantities of the report's criteria. The
+report takes the noise from `settings.LOOKING_AHEAD` and races both on its own drives.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def race(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> tuple[list[NoiseLevel], Sharpness]:
-    """The levels with the noise that is chosen, and both filters at them over `seeds` drives."""
+    """The levels with the chosen noise, and both filters at them over `seeds` drives."""
     chosen, share = [], 0.8 / len(levels)
     for i, level in enumerate(levels):
         told = part(progress, i * share, (i + 1) * share, f"level {i + 1}")
@@ -74,7 +74,8 @@ def race(
 
 
 def main() -> None:
-    """Print the noise of each level, and there the error, the share of drives won and the spread of the log-likelihood."""
+    """Print the noise of each level, with the error, the share of drives won and the interquartile range of the
+    log-likelihood."""
     jax.config.update("jax_enable_x64", True)
     chosen, raced = race(Study(), 20, jax.random.key(0))
     compared = raced.found[PAPERS_PARTICLES].compare("error", "filter", "APF", "PF")
@@ -83,7 +84,7 @@ def main() -> None:
         spread = likelihood_ratio(raced, PAPERS_PARTICLES, i)
         print(f"{level.yaw_rate:g} rad/s, {level.a_y:g} m/s^2, {level.noise}")
         print(
-            f"   error {error:.3f} of the plain filter's, wins {wins:.0%}, log-likelihood spreads {spread:.3f} times as much"
+            f"   error {error:.3f} of the plain filter's, wins {wins:.0%}, range of log-likelihood {spread:.3f} times as large"
         )
 
 

@@ -1,4 +1,4 @@
-"""The paper's experiment with its printed settings, errata included: it starts at the truth, and looks at the truth again."""
+"""The paper's experiment with its printed settings, errata included: it starts at the truth, and uses the truth again."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Printed:
     """The printed settings: P0 = Q = I(11), R = 0.01, N = 300, Runge-Kutta 4 with 0.09 s over 7 s, 25 m/s.
 
     `spread`: 1 is the printed I(11), in the units of each parameter; `share`: the final rule's 20 per cent. The steering
-    amplitude (rad) and which outputs are measured are not printed: ours, as elsewhere. `as_printed_geometry`: the
-    printed, almost surely swapped, axle distances; with the literal spread the car spins in either.
+    amplitude (rad) and the measured outputs are not printed: ours, as in the other studies. `as_printed_geometry`: the printed
+    axle distances, which are almost surely swapped; with the literal spread the car spins in both geometries.
     """
 
     particles: int = 300
@@ -55,7 +55,8 @@ class PrintedOutcome(NamedTuple):
 
 
 def closest_share(series, truth, share: float):
-    """The paper's final rule: the mean of the `share` of the estimates (8, T) closest to the truth, which nobody has."""
+    """The paper's final rule: the mean of the `share` of the estimates (8, T) closest to the truth, which is unknown in
+    practice."""
     kept = max(1, round(share * series.shape[-1]))
     order = jnp.argsort(jnp.abs(series - truth[:, None]), axis=-1)[:, :kept]
     return jnp.mean(jnp.take_along_axis(series, order, axis=-1), axis=-1)
@@ -82,7 +83,7 @@ def one_printed_run(printed: Printed, key) -> PrintedOutcome:
     devices = sensors.esc(yaw_rate=printed.measurement_std, a_y=printed.measurement_std)
     manoeuvre = manoeuvres.double_lane_change(speed=printed.speed, steer=printed.steer, duration=printed.duration)
     drive = simulate(car, manoeuvre, devices, key=drive_key, dt=printed.step, throw=False)
-    # The printed identity, whatever the unit: a spread of one newton, and of one per radian.
+    # The printed identity, for any unit: a standard deviation of one newton, and of one per radian.
     relative = {p.name: printed.spread / float(p.scale or 1.0) for p in chosen}
     ones = {p.name: relative[p.name] / (1.0 if p.scale else v) for p, v in zip(chosen, truth, strict=True)}
     per_root_second = 1 / math.sqrt(printed.step)

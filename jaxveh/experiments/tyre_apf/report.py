@@ -1,4 +1,4 @@
-"""What the tyre-apf experiment finds: the runs, checks against the printed numbers and against honest criteria."""
+"""The results of the tyre-apf experiment: the runs, and checks against the printed numbers and against honest criteria."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from jaxveh.simulation import simulate
 from jaxveh.sweeps import IN_MEMORY, Stores, Table
 
 FEW = 10
-"""Seeds at most of the other drives and of what order and integrator do, which no criterion judges."""
+"""Most seeds of the other drives and of the effects of order and integrator, for which there is no criterion."""
 
 
 def run(
@@ -57,7 +57,7 @@ def run(
     staged = run_staged(study, seeds, honest_key, progress=told, stores=stores.under("lane-change"))
     progress(0.4, 1.0, "observability in the lane change")
     lane_change = lane_change_observability(study)
-    # Drives of their own, beside the study's.
+    # Drives of their own, besides the study's.
     saturated_key, sharp_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 2))
     told = part(progress, 0.42, 0.65, "saturated")
     saturated = run_saturated(study, seeds, saturated_key, progress=told, stores=stores.under("saturated"))
@@ -103,7 +103,7 @@ def looked_at_the_truth(staged: Staged, printed: Printed) -> dict[str, np.ndarra
 def as_printed(
     *, seeds: int = 20, seed: int = 0, progress: Progress = silent, stores: Stores = IN_MEMORY
 ) -> list[Table]:
-    """The printed settings alone, errata included."""
+    """Only the printed settings, errata included."""
     progress(0.0, 1.0, "printed settings")
     printed = Printed()
     _, key = jax.random.split(jax.random.key(seed))
@@ -118,7 +118,7 @@ def settings(result: Reproduction) -> dict:
 
 
 def lane_change_observability(study: Study) -> Observability:
-    """What the study's lane change can tell about the eight parameters."""
+    """The information about the eight parameters in the study's lane change."""
     car = vehicles.passenger_car()
     manoeuvre = manoeuvres.double_lane_change(speed=study.speed, steer=study.steer, duration=study.duration)
     devices = sensors.esc(yaw_rate=study.yaw_rate_std, a_y=study.a_y_std)
@@ -173,11 +173,11 @@ def check(result: Reproduction) -> list[Check]:
 def _sharpness_checks(found: Sharpness, which: str = "APF") -> list[Check]:
     """At the paper's number of particles and with its resampling: the APF over the PF, paired; `which` is its name.
 
-    Three of the paper's do not hold with the noise that `noise.choose_level` takes: with sharp sensors the APF errs 0.98 times as
-    much as the PF and wins 55 % of drives (over 40 others, 16 passes each: 0.99 [0.94, 1.03], 53 %; with twice that noise in the
-    yaw rate, less likely, 0.92 [0.88, 0.95], 75 %); and with coarse ones its log-likelihood spreads 0.85 times as much (over 40
-    others, 48 passes each: 0.87, 90 % interval 0.77 to 0.99), a fully adapted filter's 0.81: one row ahead tells little of eight
-    parameters.
+    Three of the paper's do not hold with the noise of `noise.choose_level`: with sharp sensors the APF has 0.98 times the
+    error of the PF and wins 55 % of drives (over 40 others, 16 passes each: 0.99 [0.94, 1.03], 53 %; with twice that noise
+    in the yaw rate, less likely, 0.92 [0.88, 0.95], 75 %); and with coarse ones its log-likelihood varies 0.85 times as much
+    (over 40 others, 48 passes each: 0.87, 90 % interval 0.77 to 0.99), a fully adapted filter's 0.81: one row ahead contains
+    little information about eight parameters.
     """
     compared, checks = found.found[PAPERS_PARTICLES].compare("error", "filter", "APF", "PF"), []
     for i, bound in enumerate((0.95, 1.1, 1.1)):

@@ -1,4 +1,4 @@
-"""What the experiment found, as one value."""
+"""The results of the experiment, as one value."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from jaxveh.sweeps import Swept
 
 
 class Reproduction(NamedTuple):
-    """Everything the experiment found; leaves over seeds.
+    """All results of the experiment; leaves over seeds.
 
-    `outcome` of the honest lane change, `steps`: errors of step steers by degrees; `lane_change`: what it can tell of eight
-    parameters; `saturated`, `sharpness`: the further drives and sweeps, `ahead` the last
-    with a filter that looks ahead with the process noise. `printed`: what the printed settings do. `peeked`: the honest filters'
-    parameters, (seeds, 8), by the paper's final rule, which looks at the truth. `first_step`: the step of 5 degrees with each
-    estimator's tyres, (seeds, outputs, T); `open_loop`: the lane change with them; `tracks`: parameters over time; `variants`:
-    the lane change in other ways; `order`: what order and integrator do to the particle filter.
+    `outcome` of the honest lane change, `steps`: errors of step steers by degrees; `lane_change`: its information about the
+    eight parameters; `saturated`, `sharpness`: the further drives and sweeps; `ahead`: the sweep with a filter that looks
+    ahead with the process noise. `printed`: results of the printed settings. `peeked`: the honest filters' parameters,
+    (seeds, 8), by the paper's final rule, which uses the truth. `first_step`: the step of 5 degrees with each estimator's
+    tyres, (seeds, outputs, T); `open_loop`: the lane change with them; `tracks`: parameters over time; `variants`: the lane
+    change in other ways; `order`: the effects of order and integrator on the particle filter.
     """
 
     study: Study

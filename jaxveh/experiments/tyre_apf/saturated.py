@@ -1,9 +1,9 @@
-"""Where both axles pass the peak of their curves: D and B can be identified, all eight parameters hardly.
+"""Drives in which both axles pass the peak of their curves: D and B can be identified, all eight parameters hardly.
 
-Two drives that the lane change at 25 m/s is not: a lane change at 40 m/s, and a sine sweep of 15 degrees at the road wheels.
-Beyond the peak a car remembers a small error of its tyres for long: that is why these drives tell so much. For the same reason
-steering that is held between two rows, and so is late by half a step, ends beside the truth by thirty times the bound: here it
-runs linearly.
+Two drives that differ from the lane change at 25 m/s: a lane change at 40 m/s, and a sine sweep of 15 degrees at the road
+wheels. Beyond the peak a small error of the tyres affects the motion for long: that is why these drives contain so much
+information. For the same reason, estimates with steering that is held between two rows, and so is late by half a step, miss
+the truth by thirty times the bound: here the steering is linear between rows.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ def stiffness_and_peak(car):
 
 
 UNKNOWN = {"D and B": stiffness_and_peak, "all eight": tyres}
-"""What is estimated."""
+"""The estimated parameters."""
 
 
 class Saturated(NamedTuple):
     """`found`: errors by estimator, unknowns, case and seed on the parameters' real line, (..., p); `bounds`: by unknowns,
-    then by case, what the drive can tell at all; `cases`: their names."""
+    then by case, the information in the drive; `cases`: their names."""
 
     cases: tuple[str, ...]
     found: dict[str, sweeps.Swept]
@@ -76,8 +76,8 @@ def run_saturated(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> Saturated:
-    """UKF and MAP (or `only` these) on both drives, with D and B `unknown`; with all eight the UKF alone, since a
-    fit takes long to say that they cannot be told apart."""
+    """UKF and MAP (or `only` these) on both drives, with D and B `unknown`; with all eight only the UKF, because a fit takes
+    long to find that they cannot be distinguished."""
     cases = cases_of(study)
     progress(0.0, 1.0, "drives")
     drives = [
@@ -106,7 +106,7 @@ def _record(study: Study, manoeuvre, key, throw: bool = False) -> Recording:
 
 
 def _drives(study: Study, manoeuvre, seeds: int, key, stores: Stores) -> dict[str, np.ndarray]:
-    """The channels that filters see, (seeds, T)."""
+    """The channels that filters may use, (seeds, T)."""
 
     def run(point, key):
         drive = _record(study, manoeuvre, jax.random.fold_in(key, 1))
@@ -146,7 +146,7 @@ def _estimators(study: Study, where) -> dict:
         return {"error": error(values), "result": estimate.result.astype(jnp.int32)}
 
     def fitted(key, drive):
-        # Short pieces tied loosely find the valley, the whole drive its floor.
+        # Short, loosely tied pieces find the valley, the whole drive its lowest point.
         model, rows = started(key, drive, study.gaussian)
         segments = fitting_kit.cut_rows(rows, round(study.window * study.rate))
         fit = solve(pose_shooting(model, segments), max_steps=100, standard_errors=False)
@@ -160,8 +160,8 @@ def _estimators(study: Study, where) -> dict:
 
 
 def single_shooting(model: StateSpace, rows: Row, start) -> tuple[jax.Array, jax.Array]:
-    """The parameters (p,) on the real line whose undisturbed course from the prior's first state fits best, the prior counted
-    (output error, Ljung 1999, ch. 4), by Levenberg-Marquardt from `start`; and whether it converged."""
+    """The parameters (p,) on the real line whose undisturbed course from the prior's first state fits best, the prior
+    included (output error, Ljung 1999, ch. 4), by Levenberg-Marquardt from `start`; and whether it converged."""
     mean = jnp.stack(model.prior.mean)
     n = mean.size - start.size
     spread = jnp.sqrt(jnp.diagonal(model.prior.covariance()))[n:]
@@ -181,6 +181,6 @@ def single_shooting(model: StateSpace, rows: Row, start) -> tuple[jax.Array, jax
 
 
 def over_bound(result: Saturated, unknown: str, estimator: str, case: str) -> np.ndarray:
-    """(p,) root mean square over seeds of each parameter's error, over its Cramer-Rao bound."""
+    """(p,) root mean square over seeds of each parameter's error, divided by its Cramer-Rao bound."""
     error = result.found[unknown].at("error", estimator=estimator)[result.cases.index(case)]
     return np.sqrt(np.mean(error**2, axis=0)) / result.bounds[unknown][case].bounds.array()

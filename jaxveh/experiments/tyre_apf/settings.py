@@ -1,4 +1,4 @@
-"""What the paper prints, and what the honest study of it assumes."""
+"""The printed numbers of the paper, and the assumptions of the honest study of it."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ STEP_STEER = {10: (0.031, 0.015), 15: (0.052, 0.026)}
 """Degrees of step steer: RMSE of yaw (rad) and yaw rate (rad/s), as printed."""
 
 STEPS = (5, *STEP_STEER)
-"""Degrees of step steer, that of the paper's figures 19 to 23 first, of which no number is printed."""
+"""Degrees of step steer; first that of the paper's figures 19 to 23, for which no number is printed."""
 
 STEP_OUTPUTS = {"yaw": "rad", "yaw_rate": "rad/s", "v_y": "m/s", "F_yf": "N", "F_yr": "N"}
-"""What is shown of a step steer, with units."""
+"""The outputs of a step steer that are shown, with units."""
 
 
 def tyres(car):
@@ -53,9 +53,10 @@ def tyres(car):
 
 @dataclasses.dataclass(frozen=True)
 class StudyNoise:
-    """What a filter's model adds to a drive that has none: `v_y` m/s, `yaw_rate` rad/s, `walk` of the parameters (relative).
+    """The process noise that a filter's model adds to a drive without any: `v_y` m/s, `yaw_rate` rad/s, `walk` of the
+    parameters (relative).
 
-    All per root second. They pay for what the filter does approximately: its sigma points, or its finite cloud.
+    All per root second. They allow for the filter's approximations: its sigma points, or its finite number of particles.
     """
 
     v_y: float
@@ -64,8 +65,8 @@ class StudyNoise:
 
 
 class NoiseLevel(NamedTuple):
-    """The sensors' noise, `yaw_rate` (rad/s) and `a_y` (m/s^2), and the process noise that both particle filters assume there:
-    the one with the largest mean of their log-likelihoods on drives of other seeds (`noise.choose_level`)."""
+    """The sensors' noise, `yaw_rate` (rad/s) and `a_y` (m/s^2), and the process `noise` of both particle filters at this
+    level: the one with the largest mean of their log-likelihoods on drives of other seeds (`noise.choose_level`)."""
 
     yaw_rate: float
     a_y: float
@@ -77,26 +78,26 @@ LEVELS = (
     NoiseLevel(0.005, 0.1, StudyNoise(v_y=0.01, yaw_rate=0.005, walk=0.1)),
     NoiseLevel(0.02, 0.4, StudyNoise(v_y=0.01, yaw_rate=0.002, walk=0.1)),
 )
-"""From sharp sensors to coarse ones; the middle is the study's."""
+"""From sharp sensors to coarse ones; the middle one is the study's."""
 
 LOOKING_AHEAD = (
     NoiseLevel(0.001, 0.02, StudyNoise(v_y=0.05, yaw_rate=0.001, walk=0.1)),
     NoiseLevel(0.005, 0.1, StudyNoise(v_y=0.02, yaw_rate=0.002, walk=0.1)),
     NoiseLevel(0.02, 0.4, StudyNoise(v_y=0.01, yaw_rate=0.002, walk=0.1)),
 )
-"""The same, chosen with an auxiliary filter that looks ahead with the process noise (`predictive`)."""
+"""The same levels, with noise chosen for an auxiliary filter that looks ahead with the process noise (`predictive`)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Study:
-    """The honest study: a double lane change, a prior that does not know the truth, four estimators side by side.
+    """The honest study: a double lane change, a prior whose mean is not the truth, four estimators side by side.
 
     `speed` m/s; `steer` rad at the road wheels; `duration` s; `rate` Hz; `yaw_rate_std` rad/s and `a_y_std` m/s^2 the
-    sensors' noise; `prior` the relative spread of the parameters (E: times 2, so 0.2); `particles`; `window` s of the
-    multiple shooting; `low_pass` Hz of the sensors in the variants that have one. `gaussian`: the noise of UKF and MAP,
-    `particle`: that of PF and APF, both chosen by the filters' own likelihood on drives of other seeds (`noise.choose`), so
-    that the truth has no part in them. `saturated`: that of the UKF where both axles pass their peak: next to nothing, since
-    inputs run linearly there and the model is the truth's.
+    sensors' noise; `prior` the relative standard deviation of the parameters (E: times 2, so 0.2); `particles`; `window` s
+    of the multiple shooting; `low_pass` Hz of the sensors in the variants that have one. `gaussian`: the noise of UKF and
+    MAP, `particle`: that of PF and APF, both chosen by the filters' own likelihood on drives of other seeds
+    (`noise.choose`), so that the truth is not used. `saturated`: that of the UKF if both axles pass their peak: almost zero,
+    because inputs are linear between rows there and the model is the truth's.
     """
 
     speed: float = 25.0

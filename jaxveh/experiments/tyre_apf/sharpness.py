@@ -1,7 +1,7 @@
-"""Auxiliary against plain particle filter: over the sharpness of the sensors, the number of particles, and how they resample.
+"""Auxiliary and plain particle filter compared: by the sensors' noise, the number of particles, and the resampling.
 
-Both draw at every row, by multinomial resampling as the paper has it; systematic resampling, which draws with less noise, is
-beside it: but for sharp sensors it gives the plain filter more than looking ahead does.
+Both resample at every row, multinomially as in the paper; systematic resampling, which has less noise, is shown beside it:
+except with sharp sensors it gives the plain filter more than looking ahead does.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ from jaxveh.experiments.tyre_apf.study import auxiliary, drive_once, guess_once,
 from jaxveh.sweeps import IN_MEMORY, Stores
 
 PAPERS_PARTICLES = 300
-"""As printed."""
+"""The printed number."""
 
 COUNTS = (100, PAPERS_PARTICLES)
 
 AGAIN = 8
-"""How often each filter goes over the same drive, with other draws."""
+"""Number of passes of each filter over the same drive, with other draws."""
 
 Kinds = Mapping[str, Callable[..., filters.AbstractParticleFilter]]
 
 KINDS: Kinds = {"PF": filters.ParticleFilter, "APF": auxiliary}
-"""The paper's filters, which the criteria are about."""
+"""The paper's filters, for which the criteria were asked."""
 
 PREDICTIVE: Kinds = {"PF": filters.ParticleFilter, "APF": filters.AuxiliaryParticleFilter}
 """The same with an auxiliary filter that looks ahead with the process noise: a contestant of its own (`predictive`)."""
 
 SYSTEMATIC = "systematic"
-"""What follows the name of a filter that resamples so."""
+"""The ending of the name of a filter with systematic resampling."""
 
 
 class Sharpness(NamedTuple):
-    """By number of particles, `found` over filter (the prior first), level and seed: `error`, the root mean square of the eight
-    parameters' errors in prior standard deviations, over all passes; `likelihood_spread`, the interquartile range of the
-    log-likelihood over passes of one drive; `result`."""
+    """By number of particles, `found` over filter (the prior first), level and seed: `error`, the root mean square of the
+    eight parameters' errors in prior standard deviations, over all passes; `likelihood_spread`, the interquartile range of
+    the log-likelihood over passes of one drive; `result`."""
 
     found: dict[int, sweeps.Swept]
 
@@ -77,7 +77,7 @@ def run_sharpness(
 
 
 def contestants(count: int, kinds: Kinds | None = None) -> dict[str, filters.AbstractParticleFilter]:
-    """Both filters with `count` particles; with the paper's number, both ways to resample."""
+    """Both filters with `count` particles; with the paper's number, in both ways of resampling."""
     kinds = KINDS if kinds is None else kinds
     chosen = {name: kind(count, numerics.multinomial) for name, kind in kinds.items()}
     if count == PAPERS_PARTICLES:
@@ -86,7 +86,7 @@ def contestants(count: int, kinds: Kinds | None = None) -> dict[str, filters.Abs
 
 
 def errors_of(study: Study, values):
-    """The values' (..., 8) errors in prior standard deviations."""
+    """The errors of `values` (..., 8) in prior standard deviations."""
     car = vehicles.passenger_car()
     chosen = resolve(car, tyres)
     truth = pick(car, chosen)
@@ -144,7 +144,7 @@ def several_passes(study: Study, filter_, level: NoiseLevel, again: int, key) ->
 
 
 def drive_at(study: Study, level: NoiseLevel, key) -> Recording:
-    """The lane change of `several_passes`, as the level's sensors see it."""
+    """The lane change of `several_passes`, measured with the level's noise."""
     return drive_once(_at(study, level), jax.random.fold_in(key, 1))
 
 
@@ -153,7 +153,7 @@ def _at(study: Study, level: NoiseLevel) -> Study:
 
 
 def pairs(runs: sweeps.Swept) -> list[tuple[str, str]]:
-    """Of these filters the auxiliary ones, each with its plain one."""
+    """The auxiliary filters among these, each with its plain one."""
     names = runs.design.axis("filter").labels
     return [
         (name, name.removeprefix("A")) for name in names if name.startswith("APF") and name.removeprefix("A") in names
@@ -161,6 +161,6 @@ def pairs(runs: sweeps.Swept) -> list[tuple[str, str]]:
 
 
 def likelihood_ratio(result: Sharpness, count: int, level: int, auxiliary: str = "APF", plain: str = "PF") -> float:
-    """The APF's spread of the log-likelihood over the PF's: of the medians over seeds."""
+    """The interquartile range of the APF's log-likelihood over the PF's: ratio of the medians over seeds."""
     spread = lambda name: np.median(result.found[count].at("likelihood_spread", filter=name, level=float(level)))
     return float(spread(auxiliary) / spread(plain))

@@ -1,4 +1,4 @@
-"""The same study, an estimator at a time: for a person who watches, with compile and run times of each."""
+"""The same study, one estimator after the other: for interactive use, with compile and run times of each."""
 
 from __future__ import annotations
 
@@ -41,19 +41,19 @@ FILTERS = ("PF", "APF", "UKF")
 
 
 class Seconds(NamedTuple):
-    """What a stage cost: compiling, and running once compiled, s, all seeds together."""
+    """The times of a stage: compiling, and running once compiled, s, all seeds together."""
 
     compile: float
     run: float
 
 
 class Staged(NamedTuple):
-    """The study's result and how it came about. Leaves have the seeds in front.
+    """The study's result and its parts. Leaves have the seeds in front.
 
     `outcome`: each seed's; `steps`: errors of step steers by angle, and `first_step`: the course of the first of them by name,
-    the truth among them, (seeds, outputs, T). `estimates`: the filters' `Estimate` by name;
-    `fit`: the MAP's `fitting.Fit`. `open_loop`: mapping from each estimator to the states that its tyres give without any
-    measurement. `observability`: what the drive can tell of the eight parameters at all, at the truth. `seconds`: by stage.
+    the truth among them, (seeds, outputs, T). `estimates`: the filters' `Estimate` by name; `fit`: the MAP's `fitting.Fit`.
+    `open_loop`: mapping from each estimator to the states that its tyres give without any measurement. `observability`: the
+    information about the eight parameters in the drive, at the truth. `seconds`: by stage.
     """
 
     outcome: Outcome
@@ -128,8 +128,8 @@ def _fit(study: Study) -> Callable:
 
 
 def _judge(study: Study) -> Callable:
-    """Errors of all estimators' tyres: curves (5, 2), open-loop states' errors (5, 2), those states, step steers and the first of
-    these."""
+    """Errors of all estimators' tyres: curves (5, 2), open-loop states' errors (5, 2), those states, step steers and the
+    first of these."""
 
     def each(values, drive):
         car = with_tyres(values)
@@ -145,8 +145,8 @@ def _judge(study: Study) -> Callable:
 
 
 def _step_steers(study: Study, values) -> tuple[dict, jax.Array]:
-    """RMSE of `STEP_OUTPUTS` of each estimator's tyres (5, outputs), by angle, and the course of the first step, the truth's in
-    front, (6, outputs, T); one simulation for all of them."""
+    """RMSE of `STEP_OUTPUTS` with each estimator's tyres (5, outputs), by angle, and the course of the first step, with the
+    truth's in front, (6, outputs, T); one simulation for all of them."""
     truth = jnp.stack(pick(vehicles.passenger_car(), resolve(vehicles.passenger_car(), tyres)))
     steers = jnp.asarray([math.radians(degrees) for degrees in STEPS], values.dtype)
 
@@ -161,7 +161,7 @@ def _step_steers(study: Study, values) -> tuple[dict, jax.Array]:
 
 
 def _segments(study: Study, drive, guess):
-    """The fit's segments of every seed, stacked; cutting is host-side work."""
+    """The fit's segments of every seed, stacked; they are cut on the host."""
     count = drive.time.shape[0]
     each = lambda i: jax.tree.map(lambda leaf: leaf[i], (guess, drive))
     parts = []
@@ -193,7 +193,7 @@ def _parameters(study: Study, guess, estimates: dict, fit) -> tuple[dict, dict]:
 
 
 class _Clock:
-    """Compiles stages, two at a time, runs them one at a time, and keeps what each took."""
+    """Compiles stages, two at a time, runs them one at a time, and keeps their times."""
 
     def __init__(self, count: int, progress: Progress, stores: Stores):
         self.count, self.progress, self.stores = count, progress, stores
@@ -208,7 +208,7 @@ class _Clock:
 
     def many(self, tasks: dict[str, tuple], hold: tuple[str, ...], host: dict[str, Callable]) -> dict:
         """Compile all tasks and run those that are not held back; `host`: functions that compile by themselves."""
-        # The compiler does not hold Python's lock, so that a second core helps; the longest come first.
+        # The compiler does not hold Python's lock, so a second core helps; the longest come first.
         waiting = [*tasks, *host]
         self.progress(self.done, self.total, f"compiling: {', '.join(waiting)}")
 
@@ -241,7 +241,7 @@ class _Clock:
         if self.stores.folder is None:
             self.compiled[name] = eqx.filter_jit(self._over_batch(function)).lower(*args).compile()
         else:
-            # Compiled when a chunk is missing.
+            # Compiled only if a chunk is missing.
             told = lambda done, total, stage: self.progress(self.done + done / total, self.total, f"{name}: {stage}")
             own = self.stores.under(name.replace(" ", "-"))
             self.compiled[name] = lambda *args: own.each("runs", function, *args, progress=told)
@@ -251,12 +251,12 @@ class _Clock:
     def _over_batch(self, function: Callable) -> Callable:
         if self.count > 1:
             return lambda *args: jax.vmap(function)(*args)
-        # One seed runs as a single user's call would, without the cost of a batch.
+        # One seed runs like the call of a single user, without the cost of a batch.
         return lambda *args: _grow(function(*_shrink(args)))
 
 
 def _first(recording: Recording) -> Recording:
-    """The first seed's drive, stamps on the host as a recording of one's own has them."""
+    """The first seed's drive, with stamps on the host as in an ordinary recording."""
     return Recording(
         np.asarray(recording.time[0]), {n: v[0] for n, v in recording.channels.items()}, dict(recording.units)
     )

@@ -1,4 +1,4 @@
-"""The paper's double lane change done honestly: prior, particle filters, unscented filter and MAP fit side by side."""
+"""The paper's double lane change as an honest study: prior, particle filters, unscented filter and MAP fit side by side."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ class Outcome(NamedTuple):
 
 
 def drive_once(study: Study, key) -> Recording:
-    """The paper's double lane change with the swapped geometry, as sensors saw it."""
+    """The paper's double lane change with the swapped geometry, as measured by the sensors."""
     manoeuvre = manoeuvres.double_lane_change(speed=study.speed, steer=study.steer, duration=study.duration)
     devices = sensors.esc(yaw_rate=study.yaw_rate_std, a_y=study.a_y_std)
     return simulate(vehicles.passenger_car(), manoeuvre, devices, key=key, dt=1 / study.rate, throw=False)
 
 
 def guess_once(study: Study, key, where=tyres):
-    """A car of which the parameters `where` are a draw around the truth: what an honest prior's mean looks like."""
+    """A car whose parameters `where` are a draw around the truth: an example of an honest prior's mean."""
     car = vehicles.passenger_car()
     parameters = resolve(car, where)
     values = pick(car, parameters)
@@ -58,7 +58,7 @@ def guess_once(study: Study, key, where=tyres):
 
 
 def model_of(study: Study, car, noise: StudyNoise, where=tyres, input_path: str = "held", solver=None):
-    """The state space that an estimator of the study sees, with its noise; it estimates `where`."""
+    """The state space of an estimator of the study, with its noise; it estimates `where`."""
     return estimators.state_space(
         car,
         sensors.esc(yaw_rate=study.yaw_rate_std, a_y=study.a_y_std),
@@ -72,7 +72,7 @@ def model_of(study: Study, car, noise: StudyNoise, where=tyres, input_path: str 
 
 
 def filter_of(study: Study, name: str):
-    """The filter called `PF`, `APF` or `UKF`, and the noise that its model assumes."""
+    """The filter called `PF`, `APF` or `UKF`, and the noise of its model."""
     if name == "UKF":
         return filters.Unscented(), study.gaussian
     plain = filters.ParticleFilter(study.particles)
@@ -91,7 +91,7 @@ def with_tyres(values):
 
 
 def curve_error(car, drive: Recording) -> jax.Array:
-    """(2,) RMSE of each axle's force over the truly visited slips, front and rear, as a share of the true D."""
+    """(2,) RMSE of each axle's force over the true slips of the drive, front and rear, as a share of the true D."""
     truth = vehicles.passenger_car()
     errors = []
     for axle in ("front", "rear"):
@@ -103,14 +103,14 @@ def curve_error(car, drive: Recording) -> jax.Array:
 
 
 def force(tyre, slip):
-    """The lateral force of an axle without load dependence over slip angles, N."""
+    """The lateral force of an axle without load dependence, at these slip angles, N."""
     from jaxveh.tyres import Contact
 
     return tyre.forces(Contact(slip_angle=slip)).F_y
 
 
 def open_loop(study: Study, car) -> Recording:
-    """The lane change driven by `car` without any measurement: a recording that holds inputs and truth alone."""
+    """The lane change driven by `car` without any measurement: a recording of inputs and truth only."""
     manoeuvre = manoeuvres.double_lane_change(speed=study.speed, steer=study.steer, duration=study.duration)
     return simulate(car, manoeuvre, None, dt=1 / study.rate, throw=False)
 

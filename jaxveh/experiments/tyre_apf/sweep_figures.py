@@ -1,4 +1,4 @@
-"""Pictures of the further parts: what drives beyond the peak tell, and both particle filters over the sensors' noise."""
+"""Figures of the further parts: drives beyond the peak, and both particle filters over the sensors' noise."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from jaxveh.plots import COLOURS, kit, style
 MARKS = {"prior": "s", "UKF": "o", "MAP": "D"}
 
 ASIDE = 0.09
-"""Between marks that belong to one place on the axis."""
+"""Distance between marks that belong to one place on the axis."""
 
 
 def saturated_figure(found: Saturated) -> Any:
-    """Root mean square errors of the parameters beside the Cramer-Rao bound: a column a drive, a row for what is unknown."""
+    """Root mean square errors of the parameters beside the Cramer-Rao bound: one column per drive, one row per set of
+    unknowns."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 1.2 + 2.1 * len(found.found)), layout="constrained")
     with style():
         panels = figure.subplots(len(found.found), len(found.cases), squeeze=False, sharey="row")
@@ -43,7 +44,7 @@ def saturated_figure(found: Saturated) -> Any:
 
 
 def sharpness_figure(found: Sharpness) -> Any:
-    """Errors of the eight parameters, and how far the log-likelihood spreads, over the sensors' noise: medians and quartiles."""
+    """Errors of the eight parameters, and the range of the log-likelihood, over the sensors' noise: medians and quartiles."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.4), layout="constrained")
     places = np.arange(len(LEVELS))
     with style():

@@ -1,4 +1,4 @@
-"""Every model, method, table and figure of paper 000 (Bao, Sabbioni et al. 2015), and who has it here."""
+"""Every model, method, table and figure of paper 000 (Bao, Sabbioni et al. 2015), and its place in this package."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SYSTEMS = (
         ("vehicles.SingleTrack3DOF", "experiments.tyre_apf.variants"),
     ),
     System("Magic Formula", "eq 13", ("tyres.MagicFormula",)),
-    System("longitudinal force of the torque", "eq 14", ("vehicles.AxleDrive", "experiments.tyre_apf.variants")),
+    System("longitudinal force from the torque", "eq 14", ("vehicles.AxleDrive", "experiments.tyre_apf.variants")),
     System("slip angles", "eq 15", ("vehicles.slip_angle",)),
     System("particles drawn by an extended filter", "introduction [5]", ("filters.Guided",)),
     System(
@@ -35,6 +35,6 @@ SYSTEMS = (
         ("experiments.tyre_apf.course_figures", "experiments.tyre_apf.settings"),
     ),
     System("high order by Runge-Kutta", "conclusion 1", ("experiments.tyre_apf.order",)),
-    System("the paper's sentences", "5, 6", ("experiments.tyre_apf.claims",)),
+    System("the paper's claims", "5, 6", ("experiments.tyre_apf.claims",)),
     System("drives of the real car", "4, 5", (), "the paper gives no data"),
 )

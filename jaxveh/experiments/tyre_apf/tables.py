@@ -1,4 +1,4 @@
-"""The tables of the tyre-apf experiment: honest first, the do-nothing prior in each, then as printed."""
+"""The tables of the tyre-apf experiment: first the honest study, each with the prior, which does nothing, then as printed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from jaxveh.sweeps import ConfidenceInterval, Swept, Table
 
 
 def tables(result: Reproduction) -> list[Table]:
-    """All of them."""
+    """All tables."""
     return [
         _curve_table(result),
         _parameter_table(result),
@@ -95,7 +95,7 @@ def _saturated_table(result: Reproduction) -> Table:
                 cells = [f"{by_name[one][0]:.2g} ({by_name[one][1]:.2g})" for one in shown]
                 rows.append((unknown, case, name, *cells, f"{ratio:.3g}", lost))
     return Table(
-        f"Where both axles pass their peak: RMSE in % over {result.seeds} seeds (in brackets the Cramer-Rao bound)",
+        f"Both axles beyond their peak: RMSE in % over {result.seeds} seeds (in brackets the Cramer-Rao bound)",
         ("unknown", "drive", "estimator", *shown, "worst RMSE over bound", "lost"),
         rows,
     )
@@ -139,14 +139,14 @@ def _names(runs: Swept) -> tuple[str, ...]:
 
 
 def _truth_table(result: Reproduction) -> Table:
-    """Both looks at the truth on purpose, one by one and together."""
+    """The two uses of the truth, separately and together."""
     truth = np.asarray(result.printed.truth)[0]
     honest = {name: result.outcome.parameters[name] for name in ("prior", "PF", "APF")}
     looks = [
         ("none: an honest prior, the last estimate", honest),
         ("at the end: an honest prior, the mean of the 20 % closest to the truth", result.peeked),
         ("at the start: from the truth, the last estimate", result.printed.last),
-        ("both, as the paper", result.printed.by_rule),
+        ("both, as in the paper", result.printed.by_rule),
     ]
     unit = np.where([field.endswith("E") for field in FIELDS], 1.0, truth)
     rows = []
@@ -155,7 +155,7 @@ def _truth_table(result: Reproduction) -> Table:
             error = np.abs(np.asarray(values[name]) - truth) / unit
             rows.append((look, name, *[spread(100 * error[:, i], 2) for i in range(len(FIELDS))]))
     return Table(
-        "Two ways to look at the truth: absolute error in % (E: in hundredths), median [quartiles]; 'walk' filters nothing; from "
+        "Two ways to use the truth: absolute error in % (E: in hundredths), median [quartiles]; 'walk' filters nothing; from "
         "the truth on with the printed geometry and P0 = Q = I",
         ("look", "estimator", *[field.replace("_", ".") for field in FIELDS]),
         rows,
@@ -174,7 +174,7 @@ def _printed_2(printed: PrintedOutcome) -> Table:
         rows.append((field.replace("_", "."), f"{truth[i]:g}", f"{TABLE_2[field][1]:g}", *cells))
     heads = [f"{n}, {how}" for n in ("PF", "APF", "walk") for how in ("last", "closest 20 %")]
     return Table(
-        "Table 2 as printed: every filter starts at the truth; 'closest 20 %' looks at the truth again; 'walk' filters nothing",
+        "Table 2 as printed: every filter starts at the truth; 'closest 20 %' uses the truth again; 'walk' filters nothing",
         ("parameter", "truth = start", "paper", *heads),
         rows,
     )

@@ -1,4 +1,4 @@
-"""Parameters over time, as the paper's figures 6 to 13, and what becomes of the particles towards the end."""
+"""Parameters over time, as in the paper's figures 6 to 13, and the degeneracy of the particles towards the end."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from jaxveh.experiments.tyre_apf.settings import Study, tyres
 from jaxveh.sweeps import Table, compare
 
 EVERY = 10
-"""Of so many rows one is kept."""
+"""Rows between those that are kept."""
 
 MIDDLE, END = (0.4, 0.6), (0.8, 1.0)
 """Parts of the drive: its middle fifth and its last."""
 
 
 class Tracks(NamedTuple):
-    """By filter, the prior's mean among them: `mean` and `std` of the parameters (seeds, 8, T), and the effective share of the
-    particles (seeds, T), empty where there are none. `time` s (T,)."""
+    """By filter, with the prior's mean among them: `mean` and `std` of the parameters (seeds, 8, T), and the effective
+    `share` of the particles (seeds, T), which only particle filters have. `time` s (T,)."""
 
     time: Any
     mean: dict
@@ -31,7 +31,7 @@ class Tracks(NamedTuple):
 
 
 def tracks_of(time, estimates: dict, guess: Any, guess_std: Any, particles: int) -> Tracks:
-    """Of the filters' `Estimate` by name; `guess`, `guess_std` (seeds, 8): the prior's."""
+    """The tracks of the filters' `estimates` by name; `guess`, `guess_std` (seeds, 8): the prior's."""
     time = np.asarray(time)[0, ::EVERY]
     still = lambda values: np.broadcast_to(np.asarray(values)[:, :, None], (*np.shape(values), time.size))
     mean, std, share = {"prior": still(guess)}, {"prior": still(guess_std)}, {}
@@ -44,9 +44,10 @@ def tracks_of(time, estimates: dict, guess: Any, guess_std: Any, particles: int)
 
 
 class Course(NamedTuple):
-    """Of one filter's track over seeds, in prior standard deviations of each parameter, root mean squares over all eight:
-    error in the drive's `middle` and at its `end`, over the whole drive (`rmse`); `restless`: the estimates' spread over the
-    second half about their mean, and that of both E alone; `claimed`: the filter's own spread at the end."""
+    """One filter's track over seeds, in prior standard deviations of each parameter, as root mean squares over all eight:
+    the error in the drive's `middle` and at its `end`, and over the whole drive (`rmse`); `restless`: the deviation of the
+    estimates from their mean over the second half, and `restless_E`, that of both E alone; `claimed`: the filter's own
+    standard deviation at the end."""
 
     middle: np.ndarray
     end: np.ndarray
@@ -57,7 +58,7 @@ class Course(NamedTuple):
 
 
 def course_of(tracks: Tracks, name: str, study: Study) -> Course:
-    """Of a filter, (seeds,) each."""
+    """The course of a filter, (seeds,) each."""
     car = vehicles.passenger_car()
     chosen = resolve(car, tyres)
     values = pick(car, chosen)
@@ -79,7 +80,7 @@ def course_of(tracks: Tracks, name: str, study: Study) -> Course:
 
 
 def tracks_table(tracks: Tracks, study: Study) -> Table:
-    """The figures 6 to 13 in numbers."""
+    """Figures 6 to 13 in numbers."""
     rows = []
     for name in tracks.mean:
         course = course_of(tracks, name, study)
@@ -92,7 +93,7 @@ def tracks_table(tracks: Tracks, study: Study) -> Table:
         )  # fmt: skip
     return Table(
         "Figures 6 to 13: the eight parameters over time, in prior standard deviations, median [quartiles] or ratio [95 %]",
-        ("filter", "RMSE", "in the middle fifth", "in the last fifth", "last over middle", "restless in the second half",
-         "both E", "last fifth: error over own spread", "effective particles there"),
+        ("filter", "RMSE", "in the middle fifth", "in the last fifth", "last over middle", "variation in the second half",
+         "both E", "last fifth: error over own standard deviation", "effective particles there"),
         rows,
     )  # fmt: skip

@@ -1,6 +1,7 @@
-"""The lane change as the paper has it and the study does not: low-passed sensors, a sweep, longitudinal forces, a_x as input.
+"""The paper's lane change with parts that the study leaves out: low-passed sensors, a sweep, longitudinal forces, a_x as
+input.
 
-Each is estimated with the study's settings, whose noise was chosen without any of that.
+Each is estimated with the study's settings, whose noise was chosen without these parts.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ from jaxveh.sweeps import IN_MEMORY, Stores, Table, compare
 from jaxveh.vehicles import SingleTrack, SingleTrack3DOF, sets
 
 PARTICLES = 300
-"""As printed."""
+"""The printed number."""
 
 SPEED_NOISE, A_X_NOISE = 0.1, 0.1
-"""m/s and m/s^2 of the optical speed sensor and the accelerometer, where the speed is a state."""
+"""m/s and m/s^2 of the optical speed sensor and the accelerometer, if the speed is a state."""
 
 
 class Variant(NamedTuple):
-    """`drive`: the name of its drive in `drives_by_name`; `model`: that of the filter's model; and what it is."""
+    """`drive`: the name of its drive in `drives_by_name`; `model`: the name of the filter's model; `what`: a description."""
 
     drive: str
     model: str
@@ -42,33 +43,33 @@ class Variant(NamedTuple):
 VARIANTS = {
     "as the study": Variant("lane change", "plain", "double lane change, speed told, no longitudinal force"),
     "low-pass, not told": Variant(
-        "low-pass", "plain", "sensors through a low-pass of 20 Hz, of which the filter knows nothing"
+        "low-pass", "plain", "sensors through a low-pass of 20 Hz, which is not in the filter's model"
     ),
-    "low-pass, told": Variant("low-pass", "low-pass", "the same, the low-pass in the filter's model"),
+    "low-pass, told": Variant("low-pass", "low-pass", "the same, with the low-pass in the filter's model"),
     "swept sine": Variant("swept sine", "plain", "0.2 to 2 Hz with the lane change's amplitude"),
     "drive torque, not told": Variant(
-        "driven", "plain", "the engine holds the speed; the filter is told a measured v_x alone"
+        "driven", "plain", "the engine holds the speed; the filter is told only a measured v_x"
     ),
-    "a_x as input": Variant("driven by a_x", "plain", "the same, told the integral of the measured a_x for v_x"),
+    "a_x as input": Variant("driven by a_x", "plain", "the same, but told the integral of the measured a_x as v_x"),
     "drive torque, told": Variant(
         "driven", "driven", "eqs 12 and 14: F_L = torque / radius; v_x a state, a_x and v_x measured"
     ),
 }
-"""All of them; the study's own first."""
+"""All variants, beginning with the study's own."""
 
 ESTIMATORS = ("EKF", "UKF", "APF")
-"""Beside the prior. The extended filter of the parameters is M. Best's (2010), reference 3 of the paper; its noise is that of the
-unscented one."""
+"""The estimators besides the prior. The extended filter of the parameters is that of M. Best (2010), reference 3 of the
+paper; its noise is that of the unscented filter."""
 
 CHANNELS = ("steer", "v_x", "yaw_rate", "a_y", "a_x", "drive_torque", "brake_torque")
 TRUTH = ("v_y", "yaw_rate", "slip_angle_front", "slip_angle_rear")
-"""What is kept of a drive; channels that it has not are zero."""
+"""Channels and truths of a drive that are kept; channels that it does not have are zero."""
 
 
 def driven_car(car: SingleTrack) -> SingleTrack3DOF:
     """The same car with its speed as a state: eq 12 of the paper in the car's axes, `F_L = torque / radius` by eq 14.
 
-    The engine drives the front axle; height and radius are our own estimate, and no tyre depends on its load.
+    The engine drives the front axle; height and radius are our own estimate, and the tyres do not depend on their load.
     """
     numbers = sets.passenger_car()
     return SingleTrack3DOF(
@@ -83,7 +84,7 @@ def _devices(study: Study, **options: Any) -> sensors.SensorSet:
 
 
 def drives_by_name(study: Study) -> dict[str, Callable[[Any], Recording]]:
-    """The drives, each of a key."""
+    """The drives, each a function of a key."""
     lane = manoeuvres.double_lane_change(speed=study.speed, steer=study.steer, duration=study.duration)
     swept = manoeuvres.swept_sine(
         speed=study.speed, steer=study.steer, from_frequency=0.2, to_frequency=2.0, duration=study.duration
@@ -101,7 +102,7 @@ def drives_by_name(study: Study) -> dict[str, Callable[[Any], Recording]]:
 
 
 def model_by_name(study: Study, name: str, guess: SingleTrack, noise: StudyNoise) -> StateSpace:
-    """What a filter knows: the study's single track (`plain`), with the sensors' `low-pass`, or `driven` by its torques."""
+    """The filter's model: the study's single track (`plain`), with the sensors' `low-pass`, or `driven` by its torques."""
     process = {"v_y": noise.v_y, "yaw_rate": noise.yaw_rate}
     told: dict[str, Any] = dict(estimate=tyres, prior=study.prior, walk=noise.walk)
     if name == "driven":
@@ -124,8 +125,8 @@ def run_variants(
     stores: Stores = IN_MEMORY,
 ) -> dict[str, sweeps.Swept]:
     """Variants by the model of their filters, each on the same drives and from the same guesses: over estimator (the prior
-    first), variant and seed `curve_error` (share of D, front and rear), `state_error` (v_y, m/s, and yaw rate, rad/s; NaN of the
-    prior), `result`."""
+    first), variant and seed `curve_error` (share of D, front and rear), `state_error` (v_y, m/s, and yaw rate, rad/s; NaN
+    for the prior), `result`."""
     wanted = dict.fromkeys(VARIANTS[name].drive.removesuffix(" by a_x") for name in only)
     every = {name: go for name, go in drives_by_name(study).items() if name in wanted}
     drives = _drives(every, seeds, key, part(progress, 0.0, 0.2, "drives"), stores)
@@ -136,7 +137,7 @@ def run_variants(
     for i, model in enumerate(models):
         names = [name for name in only if VARIANTS[name].model == model]
         data = jax.tree.map(lambda *leaves: np.stack(leaves), *[drives[VARIANTS[name].drive] for name in names])
-        # Particles where the model is the study's alone: elsewhere they take long to say what they say there.
+        # Particles only with the study's own model: with the others they take long and give the same result.
         chosen = [name for name in kinds if model == "plain" or name != "APF"]
         runs = {name: _estimator(study, name, model) for name in ("prior", *chosen)}
         design = sweeps.Design(estimator=runs, variant=range(len(names)))
@@ -161,7 +162,7 @@ def _drives(every: dict, seeds: int, key, progress: Progress, stores: Stores) ->
 
 
 def _integrated(study: Study, a_x: np.ndarray) -> np.ndarray:
-    """Speeds (seeds, T) as the measured a_x makes them, without the `v_y r` that a turning car's has, too."""
+    """Speeds (seeds, T) from the measured a_x, without the `v_y r` that is also in the a_x of a turning car."""
     return (
         study.speed + np.concatenate([np.zeros((len(a_x), 1)), np.cumsum(a_x[:, :-1], axis=-1)], axis=-1) / study.rate
     )
@@ -190,14 +191,14 @@ def _estimator(study: Study, name: str, model: str) -> Callable[[Any, Any], dict
 
 
 def at_variant(found: dict[str, sweeps.Swept], metric: str, variant: str, estimator: str) -> np.ndarray:
-    """A metric over seeds."""
+    """A metric of an estimator in a variant, over seeds."""
     model = VARIANTS[variant].model
     there = [name for name in VARIANTS if VARIANTS[name].model == model]
     return found[model].at(metric, estimator=estimator)[there.index(variant)]
 
 
 def variants_table(found: dict[str, sweeps.Swept]) -> Table:
-    """What each variant does to each estimator; ratios are to the study's own drive on the same seeds."""
+    """The effect of each variant on each estimator; ratios are to the study's own drive on the same seeds."""
     rows, seeds = [], next(iter(found.values())).seeds
     for variant, (_, model, what) in VARIANTS.items():
         for name in found[model].design.axis("estimator").labels:

@@ -1,4 +1,4 @@
-"""One picture a chapter: what every method makes of every scenario, against doing nothing."""
+"""One figure per chapter: the errors of every method in every scenario, relative to doing nothing."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from jaxveh.experiments.sideslip_review.chapters.racing import CHAPTERS, Chapter
 from jaxveh.plots import kit, style
 
 STRONG = 8.0
-"""Ratio of errors at which a colour is full."""
+"""Ratio of errors with the full colour."""
 
 
 TOLD_ALREADY = ("v_y",)
-"""Of sideslip the ratios are nearly the same."""
+"""Quantities left out of the figures: the ratios of the sideslip are nearly the same."""
 
 
 def chapter_figures(raced: ChaptersRaced) -> dict[str, Any]:
-    """By the stems of their files; a chapter that was not raced has none."""
+    """Figures by the stems of their files; a chapter without results has none."""
     found = {}
     for chapter, names in CHAPTERS.items():
         labels, ratios = error_ratios(raced, names)
@@ -29,8 +29,8 @@ def chapter_figures(raced: ChaptersRaced) -> dict[str, Any]:
 
 
 def error_ratios(raced: ChaptersRaced, names: tuple[str, ...]) -> tuple[list[str], np.ndarray]:
-    """Labels of methods, and medians over seeds of their RMSE over that of doing nothing (methods, scenarios), NaN where there is
-    none."""
+    """Labels of methods, and medians over seeds of their RMSE over that of doing nothing (methods, scenarios); NaN if there
+    is none."""
     labels, rows = [], []
     for quantity, shown, _, _ in names_and_units(raced, names):
         if shown in TOLD_ALREADY:
@@ -67,5 +67,5 @@ def _map(chapter: str, labels: list[str], ratios: np.ndarray) -> Any:
         ticks = (-3, -2, -1, 0, 1, 2, 3)
         bar = figure.colorbar(mesh, ax=axes, ticks=ticks, pad=0.01, aspect=40)
         bar.ax.set_yticklabels([f"{2.0**tick:g}" for tick in ticks], fontsize=6)
-        bar.set_label("ratio of RMSE, median over seeds [-]; * is what we recommend", fontsize=6)
+        bar.set_label("ratio of RMSE, median over seeds [-]; * is recommended", fontsize=6)
     return figure

@@ -1,4 +1,4 @@
-"""One table a chapter of what every method is worth in every scenario, and one of what it is like."""
+"""One table per chapter with the errors of every method in every scenario, and one with the methods' properties."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from jaxveh.experiments.sideslip_review.chapters.scenarios import SCENARIOS
 from jaxveh.sweeps import Table
 
 SCALES = {"rad": (180.0 / np.pi, "deg"), "rad/s": (180.0 / np.pi, "deg/s"), "N/rad": (1e-3, "kN/rad")}
-"""Units in which people read what is shown."""
+"""Units in which the quantities are shown."""
 
 NOTHING = "nothing done"
 
@@ -19,7 +19,7 @@ NAMES = tuple(SCENARIOS)
 
 
 def chapter_tables(raced: ChaptersRaced) -> list[Table]:
-    """Two tables a chapter."""
+    """Two tables per chapter."""
     found = []
     for chapter, names in CHAPTERS.items():
         found += [_errors(raced, chapter, names), _properties(raced, chapter, names)]
@@ -27,7 +27,7 @@ def chapter_tables(raced: ChaptersRaced) -> list[Table]:
 
 
 def names_and_units(raced: ChaptersRaced, names: tuple[str, ...]):
-    """(quantity, shown name, scale, unit) of a chapter, those that the drives know a truth of."""
+    """(quantity, shown name, scale, unit) of a chapter, for quantities whose truth is in the drives."""
     for quantity in names:
         for shown, unit in quantities()[quantity].SHOWN.items():
             if any(key[0] == quantity and key[2] == shown for key in raced.found):
@@ -46,18 +46,17 @@ def _errors(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> Table
             if key[0] == quantity and key[2] == shown:
                 cells = [spread(scale * values["rmse"][i]) for i in range(len(NAMES))]
                 rows.append((label, method_label(quantity, key[1]), *cells))
-    return Table(
-        f"{chapter}: RMSE, median over seeds [quartiles]; * is what we recommend", ("what", "method", *NAMES), rows
-    )
+    return Table(f"{chapter}: RMSE, median over seeds [quartiles]; * is recommended", ("what", "method", *NAMES), rows)
 
 
 def method_label(quantity: str, method: str) -> str:
-    """The method's name, with a star where we recommend it."""
+    """The method's name, with a star if it is recommended."""
     return f"{method} *" if method == quantities()[quantity].RECOMMENDED else method
 
 
 def _properties(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> Table:
-    """On ordinary drives, and over all: what is known, the worst, the delay, a long run; what it needs."""
+    """Properties on ordinary drives and over all: share of known rows, the largest error, the delay, a long run; needed
+    channels."""
     rows = []
     for quantity, shown, scale, unit in names_and_units(raced, names):
         module, normal = quantities()[quantity], NAMES.index("normal")
@@ -82,17 +81,17 @@ def _properties(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> T
         "what", "method", "known, normal", "rmse of it known", "worst of all drives", "NEES of it known", "delay [s]",
         "late over early", "failed", "needs", "from",
     )  # fmt: skip
-    return Table(f"{chapter}: what the methods are like", columns, rows)
+    return Table(f"{chapter}: properties of the methods", columns, rows)
 
 
 def _median(values: np.ndarray) -> float:
-    """Over the seeds that have one."""
+    """The median over the seeds that have a value."""
     there = values[np.isfinite(values)]
     return float(np.median(there)) if there.size else float("nan")
 
 
 def _short(channels: list[str]) -> list[str]:
-    """The four wheels of a channel as one."""
+    """The channels, with the four wheels of a channel as one."""
     found: list[str] = []
     for channel in channels:
         stem, _, corner = channel.rpartition("_")

@@ -1,4 +1,4 @@
-"""The review's four conclusions, put to the test: errors of methods that follow them over those of methods that do not."""
+"""Tests of the review's four conclusions: errors of methods that follow them over those of methods that do not."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Key = tuple[str, str, str]
 
 
 class Conclusion(NamedTuple):
-    """`text`: what the review concludes. Errors of `follows` over those of `does_not` (quantity, method, shown name) in
-    `scenarios` (all where none is named: each seed counts with its geometric mean) should be below `BETTER`."""
+    """`text`: the review's conclusion. The errors of `follows` over those of `does_not` (quantity, method, shown name) in
+    `scenarios` (all if none is named: each seed counts with its geometric mean) should be below `BETTER`."""
 
     number: int
     text: str
@@ -52,8 +52,8 @@ CONCLUSIONS = (
         ("sideslip", "linear_kalman", "sideslip"),
     ),
 )
-"""The four conclusions (section 4), by the methods that we have for them. Of the second, which divides the task, its use is
-asked: whether a speed that is estimated is better than one that is looked up at the wheels."""
+"""The four conclusions (section 4), by the methods that we have for them. The second one divides the task; the question is
+its use: whether an estimated speed is better than one read off the wheels."""
 
 
 def ratio(raced: ChaptersRaced, one: Conclusion) -> ConfidenceInterval:
@@ -94,6 +94,6 @@ def conclusion_table(raced: ChaptersRaced) -> Table:
             )
         )
     return Table(
-        f"The review's conclusions: errors of one over the other's on the same seeds; better is below {BETTER:g}",
+        f"The review's conclusions: errors of one method over the other's on the same seeds; better is below {BETTER:g}",
         ("conclusion", "of", "over", "in", "ratio", "verdict"), rows,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The cars of the chapters: what their files say, and what they truly are."""
+"""The cars of the chapters: the content of their files, and the true cars."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from jaxveh.io import CarSpecification
 from jaxveh.vehicles import AbstractDrive, AntiLock, AxleDrive, FourteenDOF
 
 CARS = ("sedan", "van", "compact_car")
-"""Measured cars of CommonRoad's vehicle models, with tyres of Magic Formula 5.2; one a seed, in turn."""
+"""Measured cars of CommonRoad's vehicle models, with tyres of Magic Formula 5.2; one per seed, drawn at random."""
 
 KNOWN = {
     "steering_ratio": 16.0, "drag": 0.4, "rolling_resistance": 0.012, "brake_torque_per_pressure": 1.6e-3, "satellite_delay":
     0.15, "inertial_delay": 0.01,
 }  # fmt: skip
-"""What the cars have beyond their measured numbers, by the keys of a car's file."""
+"""Numbers of the cars in addition to the measured ones, by the keys of a car's file."""
 
 STEERING_RATIO = KNOWN["steering_ratio"]
 
 SPREADS = {"stiffness": 0.1, "grip": 0.05, "mass": 0.04, "yaw_inertia": 0.05, "place": 0.03}
-"""By how much a true car differs from its file (standard deviations, relative; `place` in m): as in the race of observers."""
+"""How much a true car differs from its file (standard deviations, relative; `place` in m): as in the race of observers."""
 
 
 def told_cars(names: tuple[str, ...] = CARS) -> list[CarSpecification]:
-    """The files, each of a car as built: nobody's draw."""
+    """The files, each of a car as built, without draws."""
     named = lambda name: vehicles.specification_of(vehicles.kit.CARS[name]())
     return [dataclasses.replace(named(name), **KNOWN) for name in names]
 
 
 def built_cars(names: tuple[str, ...] = CARS) -> FourteenDOF:
-    """The cars as built, stacked: one array axis of `names` on each leaf. One with a motor a wheel has an engine here, so
-    that the drives of all have the same channels."""
+    """The cars as built, stacked: one array axis of `names` on each leaf. A car with one motor per wheel gets an engine
+    here, so that the drives of all cars have the same channels."""
     where = lambda car: (car.drag, car.rolling_resistance, car.drive)
     axle = lambda car: car.drive if isinstance(car.drive, AxleDrive) else AxleDrive()
     resists = lambda car: (jnp.asarray(KNOWN["drag"]), jnp.asarray(KNOWN["rolling_resistance"]), axle(car))
@@ -46,9 +46,9 @@ def built_cars(names: tuple[str, ...] = CARS) -> FourteenDOF:
 
 
 def true_car(built: FourteenDOF, scenario: Scenario, key) -> AntiLock:
-    """The car as it is: off from its file by draws, with the scenario's tyres and load, and anti-lock brakes.
+    """The true car: it differs from its file by draws, and has the scenario's tyres and load, and anti-lock brakes.
 
-    Draws are lognormal: one can halve a parameter, and never makes it negative. A load lies a little behind the centre of
+    Draws are lognormal: they can halve a parameter, but never make it negative. A load lies a little behind the centre of
     gravity.
     """
     draws = scenario.spread * jax.random.normal(key, (6,))

@@ -1,4 +1,4 @@
-"""The drives of the chapters: cars of fourteen degrees of freedom, and all that their devices say."""
+"""The drives of the chapters: cars of fourteen degrees of freedom, and the measurements of all their devices."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ SPEED = 25.0
 """m/s."""
 
 SATELLITES_LATE, TRAIL = KNOWN["satellite_delay"], 0.03
-"""s, and m: by which the front wheels' contact lies behind the steering axis."""
+"""s, and m: distance of the front wheels' contact behind the steering axis."""
 
 STEER_OFFSET = 0.5 * DEGREE / STEERING_RATIO
-"""rad at the road wheels: what the steering angle of `sensors.production_car` shows in straight running."""
+"""rad at the road wheels: the steering angle that `sensors.production_car` measures in straight running."""
 
 SMALL = 0.5 * DEGREE
 """rad: up to this slip angle a tyre is linear."""
 
 EVENT = 0.5
-"""Of the drive: when the driver brakes or accelerates, and where the friction changes."""
+"""Share of the drive after which the driver brakes or accelerates, and the friction changes."""
 
 
 class Wander(AbstractManoeuvre):
-    """Random steering, at a speed that wavers and, half way, changes by `change` (m/s) within 2 s."""
+    """Random steering, at a speed that varies at random and changes by `change` (m/s) within 2 s half way."""
 
     steer: jax.Array = parameter("rad", scale=0.01)
     frequencies: jax.Array = parameter("Hz", scale=1.0)
@@ -66,7 +66,7 @@ class Wander(AbstractManoeuvre):
 
 
 class Frictions(AbstractRoad):
-    """Friction that changes at a distance `at` (m), and is less by the share `split` right of the middle."""
+    """Friction that changes at `at_distance` (m), and is less by the share `split` to the right of the middle."""
 
     before: jax.Array = positive("-")
     after: jax.Array = positive("-")
@@ -82,7 +82,7 @@ class Frictions(AbstractRoad):
 
 
 def drive_once(built: FourteenDOF, scenario: Scenario, key, *, duration: float) -> dict[str, Any]:
-    """One drive: what the devices say by channel, and the truth as `true.` channels, (T,) each, and the car's own numbers.
+    """One drive: the devices' measurements by channel, the truth as `true.` channels, (T,) each, and the car's own numbers.
 
     A pure function of arrays, for `vmap` over cars, scenarios and keys.
     """
@@ -99,15 +99,15 @@ def drive_once(built: FourteenDOF, scenario: Scenario, key, *, duration: float) 
     )  # fmt: skip
     channels = _on_a_road_that_turns({name: found[name] for name in found.names}, jnp.asarray(found.time))
     channels |= _made_of(built, scenario, channels, jnp.asarray(found.time), more_key, duration)
-    # Over what the file's tyres have: the road's friction, and the draw of the car's own.
+    # Relative to the file's tyres: the road's friction times the car's own draw.
     grip = car.vehicle.front.scaling.LMUY / built.front.scaling.LMUY
     friction = grip * sum(channels[f"true.friction_{at}"] for at in CORNERS) / 4.0
     return channels | {"true.friction": friction} | _own_numbers(car.vehicle, channels)
 
 
 def _on_a_road_that_turns(said: dict[str, Any], time) -> dict[str, Any]:
-    """What simulated roads, which are quasi-static, leave out: gyroscopes feel that the road itself rolls and pitches. And the
-    truth of the roll, which is that against the horizon."""
+    """Adds what the quasi-static roads of the simulation leave out: the road's own rates of roll and pitch in the
+    gyroscopes; and makes the true roll that against the horizon."""
     roll_rate, pitch_rate = road_rates(said["true.grade"], said["true.bank"], said["true.yaw"], time)
     return said | {
         "roll_rate": said["roll_rate"] + roll_rate,
@@ -118,8 +118,8 @@ def _on_a_road_that_turns(said: dict[str, Any], time) -> dict[str, Any]:
 
 
 def road_rates(grade, bank, yaw, time):
-    """How fast the plane of a road of these slopes (rad, (T,)) rolls and pitches under a car of this heading, rad/s: the rate of
-    the axes of the road's plane, of which `vehicles.kit.gravity` says where they lie, in themselves."""
+    """Rates (rad/s) of roll and pitch of the plane of a road with these slopes (rad, (T,)), under a car of this heading: the
+    angular velocity of the axes of the road's plane, in these axes, which are those of `vehicles.kit.gravity`."""
     along, across = numerics.tan(grade), numerics.tan(bank)
     one, none = jnp.ones_like(along), jnp.zeros_like(along)
     unit = lambda *v: jnp.stack(v, -1) / jnp.linalg.norm(jnp.stack(v, -1), axis=-1, keepdims=True)
@@ -136,11 +136,11 @@ def road_rates(grade, bank, yaw, time):
 
 
 def roll_of_horizon(grade, bank, roll, pitch):
-    """The roll (rad) against the horizon of a body that stands so on a road of these slopes."""
+    """The roll (rad) against the horizon of a body with this roll and pitch on a road of these slopes."""
     along, across = numerics.tan(grade), numerics.tan(bank)
     run = numerics.sqrt(1.0 + along * along)
     rise = numerics.sqrt(run * run + across * across)
-    # The vertical in the road's plane, then as the body pitches and rolls.
+    # The vertical in the road's plane, then rotated by the body's pitch and roll.
     x, y, z = along / run, across / (run * rise), 1.0 / rise
     z = numerics.cos(pitch) * z + numerics.sin(pitch) * x
     c, s = numerics.cos(roll), numerics.sin(roll)
@@ -148,10 +148,10 @@ def roll_of_horizon(grade, bank, roll, pitch):
 
 
 def _own_numbers(car: FourteenDOF, channels: dict[str, Any]) -> dict[str, Any]:
-    """What the methods of mass, stiffness and geometry look for, in every row.
+    """The truth of mass, stiffness and geometry, in every row.
 
-    The stiffness of an axle is the slope of its force over its wheels' slip angle in this drive: with camber and steer of the
-    leaning body it is some 15 % less than its tyres' own on a rig.
+    The stiffness of an axle is the slope of its force over its wheels' slip angle in this drive: with the camber and steer
+    of the leaning body it is some 15 % less than that of its tyres on a rig.
     """
     plain, like = linear_single_track(car), channels["true.v_x"]
     summed = lambda name, axle: channels[f"true.{name}_{axle}l"] + channels[f"true.{name}_{axle}r"]
@@ -165,7 +165,7 @@ def _own_numbers(car: FourteenDOF, channels: dict[str, Any]) -> dict[str, Any]:
 
 
 def slope_at_zero(force, slip):
-    """The slope (N/rad) of a force (T,) over a slip angle (T,) through zero, of the rows with little slip (`SMALL`)."""
+    """The slope (N/rad) of a force (T,) over a slip angle (T,) through zero, from the rows with little slip (`SMALL`)."""
     small = jnp.abs(slip) < SMALL
     return jnp.sum(jnp.where(small, force * slip, 0.0)) / jnp.sum(jnp.where(small, slip**2, 0.0))
 
@@ -173,9 +173,9 @@ def slope_at_zero(force, slip):
 def _made_of(
     built: FourteenDOF, scenario: Scenario, said: dict[str, Any], time, key, duration: float
 ) -> dict[str, Any]:
-    """What is computed of what the devices say: the road wheels' steer, each wheel's torque, the brakes' pressure, a second
-    antenna's heading (late as the course is), the torque at the steering wheel without assistance, satellites that are silent in
-    the outage."""
+    """Channels computed from the measurements: the road wheels' steer, each wheel's torque, the brakes' pressure, a second
+    antenna's heading (as late as the course), the torque at the steering wheel without assistance, and satellite channels
+    without values in the outage."""
     heading_key, torque_key = jax.random.split(key)
     share = built.drive.front_drive
     drive = dict(zip(CORNERS, (share, share, 1.0 - share, 1.0 - share), strict=True))
@@ -202,7 +202,7 @@ def _made_of(
 
 
 def total_mass(car: FourteenDOF) -> jax.Array:
-    """Body and wheels, kg."""
+    """Mass of body and wheels, kg."""
     return car.sprung_mass + 2.0 * (car.unsprung_mass_front + car.unsprung_mass_rear)
 
 
@@ -226,8 +226,8 @@ def _road(scenario: Scenario, key, duration: float) -> roads.Combined:
 
 
 def _devices(built: FourteenDOF, scenario: Scenario, key) -> sensors.Suite:
-    """What `sensors.production_car` has, with the inertial unit's other axes and its offsets drawn, and what control units know
-    of torques."""
+    """The devices of `sensors.production_car`, with the inertial unit's other axes and random offsets, and the torques of
+    the control units."""
     made = sensors.production_car(built.wheel_radius, steering_ratio=STEERING_RATIO)
     inertial, *others = made.devices
     acceleration, rate = (inertial.signals[name] for name in ("a_x", "yaw_rate"))

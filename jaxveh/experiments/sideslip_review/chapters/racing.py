@@ -1,4 +1,4 @@
-"""Every method of every quantity on the same drives, and what each is worth."""
+"""Every method of every quantity on the same drives, with its metrics."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ CHAPTERS = {
 """The review's chapters, and the quantities of `jaxveh.estimators` that belong to each."""
 
 LATEST = 100
-"""Rows by which an estimate may be late or early, to be called so."""
+"""Rows: the largest delay or lead of an estimate that is looked for."""
 
 
 class ChaptersRaced(NamedTuple):
     """`drives`: (scenarios, seeds, T) by channel; `found`: by quantity, method and shown name, values by metric, (scenarios,
-    seeds); `nothing`: the same of doing nothing, by quantity and name; `left_out`: why a method was not raced, by quantity and
-    method."""
+    seeds); `nothing`: the same for doing nothing, by quantity and name; `left_out`: why a method was left out, by quantity
+    and method."""
 
     drives: Mapping[str, np.ndarray]
     found: dict[tuple[str, str, str], dict[str, np.ndarray]]
@@ -51,12 +51,12 @@ class ChaptersRaced(NamedTuple):
 
 
 def quantities() -> dict[str, ModuleType]:
-    """Those of all chapters, by name."""
+    """The quantities of all chapters, by name."""
     return {name: getattr(estimators, name) for names in CHAPTERS.values() for name in names}
 
 
 def channels_kept() -> tuple[str, ...]:
-    """What of a drive is kept: what some method reads, and the truths."""
+    """The channels of a drive that are kept: those that a method reads, and the truths."""
     shown = {f"true.{name}" for module in quantities().values() for name in module.SHOWN}
     read = set()
     for module in quantities().values():
@@ -75,8 +75,8 @@ def chapter_drives(
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> Mapping[str, np.ndarray]:
-    """Drives of all scenarios, one a seed: (scenarios, seeds, T) each. A seed steers alike in all, with one car; `car`
-    (scenarios, seeds): its index in `cars`."""
+    """Drives of all scenarios, one per seed: (scenarios, seeds, T) each. A seed has the same steering in all of them, and
+    one car; `car` (scenarios, seeds): its index in `cars`."""
     check_whole("seeds", seeds, 2)
     built, wanted = built_cars(cars), channels_kept()
 
@@ -96,7 +96,7 @@ def chapter_drives(
 def _told_speed(
     drives: Mapping[str, np.ndarray], cars: list[CarSpecification], seeds: int, key, stores: Stores, progress: Progress
 ) -> np.ndarray:
-    """The speed that methods of other quantities are told: no car measures it, so it is our own estimate, looking back only."""
+    """The speed that methods of other quantities are told: no car measures it, so it is our own causal estimate."""
     module = estimators.speed
     methods = [module.METHODS[module.RECOMMENDED].make(car) for car in cars]
     said = lambda answer, drive: {"v_x": answer.mean.v_x}
@@ -148,8 +148,8 @@ def _data(module: ModuleType, method: AbstractMethod, drives: Mapping[str, np.nd
 
 
 def _run(methods: list[AbstractMethod], conclude: Callable[[Any, dict], dict]):
-    """One drive of a seed, as `sweeps.sweep` calls it: `conclude(answers, drive)` of the method made of the file of the seed's
-    car."""
+    """One drive of a seed, as `sweeps.sweep` calls it: `conclude(answers, drive)` for the method made from the file of the
+    seed's car."""
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[eqx.filter(one, eqx.is_array) for one in methods])
     rest = eqx.filter(methods[0], eqx.is_array, inverse=True)
 
@@ -180,18 +180,19 @@ STEP = 0.01
 """s: between rows, of the fastest device."""
 
 WARM_UP = 5.0
-"""s: not scored."""
+"""s at the beginning that are not scored."""
 
 
 LOST = np.radians(20.0)
-"""rad of sideslip: from there on a car has spun, and nothing of the drive is scored."""
+"""rad of sideslip: from there on a car has spun, and the rest of the drive is not scored."""
 
 
 def metrics(mean, std, known, truth, held) -> dict[str, Any]:
-    """Of one drive: root mean square of the error over the first and the second half (`early`, `late`), over all (`rmse`) and
-    where the method says that it knows (`rmse_known`), the largest error (`worst`), the share of rows known (`known`), the mean
-    square of the error over its claimed spread where it is known (`nees`, NaN where no spread is claimed), by how many seconds
-    it is late (`delay`), and whether it was not finite throughout (`failed`); of rows in which the car is `held`."""
+    """Metrics of one drive: root mean square error over the first and the second half (`early`, `late`), over all (`rmse`)
+    and over the rows that the method marks as known (`rmse_known`), the largest error (`worst`), the share of known rows
+    (`known`), the mean square of the error over its standard deviation in known rows (`nees`, NaN without a standard
+    deviation), the delay in seconds (`delay`), and whether it was not finite throughout (`failed`); for rows in which the
+    car is `held`."""
     rows = jnp.arange(truth.shape[0])
     warm, half = held & (rows >= round(WARM_UP / STEP)), rows.shape[0] // 2
     finite = jnp.isfinite(mean) & held
@@ -211,7 +212,7 @@ def metrics(mean, std, known, truth, held) -> dict[str, Any]:
 
 
 def _nothing(drives: Mapping[str, np.ndarray]) -> dict[tuple[str, str], dict[str, np.ndarray]]:
-    """What doing nothing is worth, by quantity and name."""
+    """The errors of doing nothing, by quantity and name."""
     found = {}
     shape = drives["car"].shape
     for quantity, module in quantities().items():

@@ -1,4 +1,4 @@
-"""What happens on the drives of the chapters, each drive ordinary but for one thing."""
+"""The drives of the chapters, each ordinary except for one thing."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import jax.numpy as jnp
 class Scenario(NamedTuple):
     """One drive's numbers.
 
-    - `steer` (rad): standard deviation at the road wheels. `wander` (m/s): that of the wanted speed.
-    - `friction`, `friction_later` (-): of the road, in its first half and from there on. `split` (-): how much less of it is
-      under the right wheels, relative; the border runs under the middle of the car.
+    - `steer` (rad): standard deviation at the road wheels. `wander` (m/s): standard deviation of the wanted speed.
+    - `friction`, `friction_later` (-): of the road, in its first half and after it. `split` (-): by which share it is less under
+      the right wheels; the border runs under the middle of the car.
     - `bank`, `grade` (rad): standard deviations along the way.
-    - `drop` (m/s): by how much the driver wants to be slower within 2 s, half way; `wheelspin` (m/s): by how much faster then.
-    - `offsets`, `spread` (-): how many times the ordinary offsets of the inertial sensors, and errors of the car's file.
-    - `stiffness`, `load` (-): by what the true tyres are stiffer than drawn, and the body heavier.
-    - `outage` (s): how long satellites are silent, from a third of the drive on.
+    - `drop` (m/s): by how much the driver slows down within 2 s, half way; `wheelspin` (m/s): by how much faster instead.
+    - `offsets`, `spread` (-): offsets of the inertial sensors, and errors of the car's file, as multiples of the ordinary ones.
+    - `stiffness`, `load` (-): factor of the true tyres' stiffness, and added share of the body's mass.
+    - `outage` (s): how long the satellites have no measurements, from a third of the drive on.
     """
 
     steer: float = 0.012
@@ -51,7 +51,7 @@ SCENARIOS = {
     "wrong stiffness": Scenario(stiffness=0.65),
     "heavy load": Scenario(load=0.3),
 }
-"""Drives by name. A long run is the end of the first against its beginning."""
+"""Drives by name. For a long run the end of the first is compared with its beginning."""
 
 
 def scenario_at(index) -> Scenario:
