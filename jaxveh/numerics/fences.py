@@ -93,9 +93,9 @@ def _barrier(leaves: list) -> list:
 
 
 # This is a primitive for three reasons. The transpose of `lax.optimization_barrier` in jax 0.11 and 0.12 fails if an operand
-# is not differentiated, as zeros that a `custom_jvp` has made arrays are not. Whether a fence pays depends on the size, which under `vmap` is known only with
-# the batch; and an ordinary `lax.cond` would become a selection there, which does not fence. A step of 240 vmapped
-# 7-DOF cars on MF-Tyre takes 2.8 instead of 17 us per car on jax 0.10, and 1.9 instead of 2.4 on jax 0.12.
+# is not differentiated, as zeros that a `custom_jvp` has made arrays are not. Whether a fence pays depends on the size, which
+# under `vmap` is known only with the batch. And an ordinary `lax.cond` would become a selection there, which does not fence. A
+# step of 240 vmapped 7-DOF cars on MF-Tyre takes 2.8 instead of 17 us per car on jax 0.10, and 1.9 instead of 2.4 on jax 0.12.
 
 
 def _lowered(*leaves, worth, barrier):

@@ -163,8 +163,8 @@ class AbstractTwoPartWrapper(AbstractTwoPartFilter, AbstractWrapper):
         for name in ("predict", "update"):
             if name in vars(cls) and not cls.__name__.startswith("Abstract") and not hasattr(super(cls, cls), name):
                 raise TypeError(
-                    f"{cls.__name__}.{name}: nothing calls it, since no base of {cls.__name__} has a method {name}. Write _{name}, "
-                    "or take a base that has it: filters.kit.AbstractStateless has update."
+                    f"{cls.__name__}.{name}: nothing calls it, since no base of {cls.__name__} has a method {name}. Write "
+                    f"_{name}, or take a base that has it: filters.kit.AbstractStateless has update."
                 )
 
     def __check_init__(self):

@@ -12,6 +12,7 @@ import jax
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, check_one_of
 from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.plain import plain_float
 from jaxveh.vehicles.base import AbstractVehicle
 from jaxveh.vehicles.wheels import Wheels, front_rear, is_straight, wheel_names, wheels_of
 
