@@ -95,7 +95,7 @@ def test_bad_tables_are_named(tyre_file, table, tmp_path, text, message):
 def test_bad_files_are_named(table, tmp_path):
     other = tmp_path / "other.tir"
     other.write_text("nothing\n")
-    assert "no tyre property file" in error_line(run("tyre", "show", other))
+    assert "not a tyre property file" in error_line(run("tyre", "show", other))
     assert "cannot be read" in error_line(run("tyre", "show", tmp_path / "absent.tir"))
     assert "-o" in error_line(run("tyre", "evaluate", other, table, "-o", tmp_path / "out.txt"))
 

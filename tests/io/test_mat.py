@@ -128,7 +128,7 @@ def test_objects_are_named(tmp_path):
     from matlab_files import Opaque
 
     write_new(tmp_path / "log.mat", {"ts": Opaque()})
-    with pytest.raises(InputError, match=r"found: ts \(timeseries\).*save the fields, as in log.v_x.Time"):
+    with pytest.raises(InputError, match=r"found: ts \(timeseries\).*save their fields, such as log.v_x.Time"):
         io.read_recording(tmp_path / "log.mat")
     write_new(tmp_path / "log.mat", {"ts": Opaque(), "time": T, "x": V})
     with pytest.raises(InputError, match=r"no column 'ts'.* Not read: ts \(timeseries\)"):
