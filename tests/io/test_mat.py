@@ -108,7 +108,7 @@ def test_a_channel_map_names_time_and_columns_by_their_whole_paths(tmp_path, ver
 
 
 NOTHING = {
-    "no time": ({"x": T, "y": V}, r"no vector goes with a time vector \(time, .*found: x \([15]x[15]\), y"),
+    "no time": ({"x": T, "y": V}, r"no vector belongs to a time vector \(time, .*found: x \([15]x[15]\), y"),
     "another length": ({"t": T, "x": np.zeros(7)}, r"found: x \([17]x[17]\)"),
     "words": ({"car": "sedan"}, "found: nothing"),
 }
