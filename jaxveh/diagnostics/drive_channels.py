@@ -46,8 +46,8 @@ def check_gaps(recording: Recording, name: str, start: float, end: float, asked_
             ended = "from the beginning" if np.isneginf(before) else f"after {before:.3f} s"
             begins = "until the end" if np.isposinf(after) else f"until {after:.3f} s"
             raise InputError(
-                f"{asked_by}: {name} has no sample {ended} {begins}; between {start:.3f} and {end:.3f} s, which the numbers need, "
-                f"a gap must be at most {LONGEST_GAP:g} s. Cut the gap off the recording (`recording.between`)."
+                f"{asked_by}: {name} has no sample {ended} {begins}; between {start:.3f} and {end:.3f} s, which the numbers "
+                f"need, a gap must be at most {LONGEST_GAP:g} s. Cut the gap off the recording (`recording.between`)."
             )
 
 

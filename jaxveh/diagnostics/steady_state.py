@@ -73,9 +73,9 @@ def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady
         moves &= ~within_gaps(recording, name)
     if not moves.any():
         raise InputError(
-            f"steady_turns: there is no row in which the car is faster than {SLOWEST:g} m/s and its lateral acceleration changes by "
-            f"less than {steady:g} m/s^3, outside gaps of more than {LONGEST_GAP:g} s in {', '.join(sorted(used))}: drive more "
-            "slowly into the turn."
+            f"steady_turns: there is no row in which the car is faster than {SLOWEST:g} m/s and its lateral acceleration changes "
+            f"by less than {steady:g} m/s^3, outside gaps of more than {LONGEST_GAP:g} s in {', '.join(sorted(used))}: drive "
+            "more slowly into the turn."
         )
     geometric = None
     if wheelbase is not None:
