@@ -56,7 +56,7 @@ def rig_fit(fit: RigFit, rig: RigTable, channels: Sequence[str] | None = None, *
     over load with their mean in groups of rows, and their histogram next to a normal law of the same standard deviation.
 
     `fit` of `fitting.fit_rig` and the `rig` that it was given; `channels`: some of the fit's, all by default. A trend in the mean
-    is what the law cannot follow; what is only noise has none. **Returns** the figure; `figure`: where to draw.
+    is a part of the data that the law cannot follow; noise has none. **Returns** the figure; `figure`: the figure to draw into.
 
     **Raises** `InputError` for a channel that was not fitted.
     """
