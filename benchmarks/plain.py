@@ -18,7 +18,7 @@ class Plain(NamedTuple):
     """A state-space model without names, in NumPy arrays of one precision, with the measurements of every run.
 
     ``transition(x, u) -> x`` and ``observation(x, u) -> y`` are functions of JAX vectors (n,) and (k,), ``moved`` and
-    ``seen`` the same in NumPy. Row t of ``inputs`` (rows, k) has the inputs of the step into row t, and those of the sensors there.
+    ``seen`` the same in NumPy. Row t of ``inputs`` (rows, k) has the inputs of the step into row t and of its measurement.
     ``mean`` (n,), ``covariance`` and ``process`` (n, n), ``noise`` (m, m), ``measured`` (runs, rows, m). ``matrices``:
     F (n, n), B (n, k), H (m, n), D (m, k) of a linear model, otherwise None. ``problem`` is the original problem.
     """
