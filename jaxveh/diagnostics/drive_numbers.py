@@ -21,7 +21,7 @@ OUTPUTS = ("yaw_rate", "a_y")
 class Peaks(NamedTuple):
     """Largest absolute values in a drive: `a_y` (m/s^2), `yaw_rate` (rad/s) and `sideslip` (rad).
 
-    `least_load` (N): the smallest load of a wheel, NaN if the recording has no loads.
+    `least_load`: N, the smallest load of a wheel, NaN if the recording has no loads.
     """
 
     a_y: float

@@ -33,8 +33,8 @@ def merge(columns: Mapping[str, Column]) -> tuple[np.ndarray, dict[str, np.ndarr
 def resample(recording: Recording, raster: str, method: str = "linear", max_gap: float = np.inf) -> Recording:
     """Return the rows in which channel `raster` has a measurement; the others are filled by `method`, `linear` or `hold`.
 
-    Gaps longer than `max_gap` seconds stay NaN, and so do rows before the first and after the last sample of a channel. No
-    low-pass is applied: a channel with more samples than `raster` may alias. Runs on the host, outside jit.
+    Gaps longer than `max_gap` seconds stay NaN, and so do rows before the first sample of a channel and, with `linear`, after its
+    last. No low-pass is applied: a channel with more samples than `raster` may alias. Runs on the host, outside jit.
 
     **Raises** `InputError` for an unknown channel or method, or if `raster` has no sample.
     """

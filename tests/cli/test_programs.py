@@ -474,7 +474,7 @@ def test_a_calibration_of_another_car_and_options_that_contradict_it(kept, tmp_p
     start = ("estimate", kept / "drive.csv", "--calibration", kept / "calibration.toml", "-o", tmp_path / "e.csv")
     line = error_line(run(*start, "--vehicle", other))
     assert "is of another car: its mass is 1420.0, that of --vehicle 1421.0" in line
-    assert "leave --as-told out" in error_line(run(*start, "--as-told"))
+    assert "leave out --as-told" in error_line(run(*start, "--as-told"))
     assert "leave out --calibrate" in error_line(run(*start, "--calibrate", "0:25"))
     both = (
         "estimate",
@@ -567,7 +567,10 @@ def test_reproduce_prints_tables_and_writes_checks(tmp_path, papers):
     assert papers == [("first", {"seeds": 7, "seed": 3})]
     assert "honest first" in result.stdout
     # What stands beside a criterion is shown, and not counted.
-    assert "1 of 2 (1 failed) hold" in result.stdout and "beside it: PF front, redesigned" in result.stdout
+    assert (
+        "original criteria that hold: 1 of 2 (1 failed)" in result.stdout
+        and "beside it: PF front, redesigned" in result.stdout
+    )
     assert "told the noise" in result.stdout and "made later" in result.stdout
     content = read_json(numbers)
     assert content["checks"][0] == {
