@@ -11,7 +11,9 @@ from jaxveh import InputError, Recording, diagnostics, estimators, vehicles
 from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.estimators.method import TURNING, method_of
 
-REFUSAL = r'steering = "rear", but its equations hold only for a car with front steering.*estimators.state_space'
+REFUSAL = (
+    r'steering = "rear", but the equations used here hold only for a car with front steering.*estimators.state_space'
+)
 REAR = dataclasses.replace(method_logs.CAR, steering="rear")
 
 
