@@ -25,6 +25,6 @@ def check_front_steered(car: CarSpecification, who: str) -> None:
     if not car.steers_front_alone:
         raise InputError(
             f'{who}: the car\'s file has steering = "{car.steering}", but the equations used here hold only for a car with '
-            "front steering. Make the vehicle (vehicles.specified_car) and a filter for it (estimators.state_space), which include "
-            "the angles of the rear wheels, or leave the steering out of the file if the rear wheels stay straight."
+            "front steering. Make the vehicle (vehicles.specified_car) and a filter for it (estimators.state_space), which "
+            "include the angles of the rear wheels, or leave the steering out of the file if the rear wheels stay straight."
         )
