@@ -25,7 +25,7 @@ EXPERIMENTS = (
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure and report; returns the exit code (2 for bad arguments)."""
+    """Measure and report; return the exit code (2 for bad arguments)."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--smoke", action="store_true", help="tiny sizes and one round: does everything run?")
     parser.add_argument("--only", default="", help="experiment or part of a case's name, e.g. unscented or apf-float64")
@@ -104,7 +104,7 @@ def _echo(text: str, pages: list[str]) -> None:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write the whole file or nothing."""
+    """Write a file completely or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
     part.write_text(text)

@@ -1,8 +1,8 @@
-"""A filter of ours beside the libraries that have the same one: the problems, and the contestants of one comparison.
+"""A filter of jaxveh beside the libraries that have the same filter: the problems, and the contestants of one comparison.
 
-A peer's adapter has one function a filter, `build(plain, dtype, **settings)`, which gives a jitted function of measurements
-(rows, m) of one run or (runs, rows, m), and of a key, or of a key a run, where the filter is random. In `LOOPS` it is
-`build(plain, **settings)`, a Python loop over one run in NumPy, a function of the measurements, and of a seed.
+A peer's adapter has one function per filter, `build(plain, dtype, **settings)`, which returns a jitted function of measurements
+(rows, m) of one run or (runs, rows, m), and, if the filter is random, of a key or of one key per run. In `LOOPS` it is
+`build(plain, **settings)`, which returns a Python loop over one run in NumPy, a function of the measurements and of a seed.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ LOOPS = ("filterpy", "particles")
 
 @dataclass(frozen=True)
 class Problem:
-    """A problem as other libraries want it, as a model of ours, and as a recording of its first run."""
+    """A problem in the form for other libraries, as a model of jaxveh, and as a recording of its first run."""
 
     title: str
     plain: Callable[..., plain.Plain]
     model: Callable[..., statespace.StateSpace]
     recording: Callable[..., jaxveh.Recording]
-    # Of one measurement (m,) the channel's names, in the order of the plain problem.
+    # The names of the channels of one measurement (m,), in the order of the plain problem.
     channels: tuple[str, ...]
 
 
@@ -51,10 +51,10 @@ PROBLEMS = {
 
 @dataclass(frozen=True)
 class Compared:
-    """A filter of ours and the peers that have it: the name of their function by library, and the settings that it takes.
+    """A filter of jaxveh and the peers that have it: the name of their function by library, and its settings.
 
-    ``smoother``: None, or how ours smooths. ``random``: whether it needs keys. ``equal``: whether the peers compute the same
-    thing; where they do not, there is no bound.
+    ``smoother``: None, or the smoother of jaxveh. ``random``: whether it needs keys. ``equal``: whether the peers compute the
+    same result; if they do not, there is no bound.
     """
 
     title: str
@@ -68,14 +68,14 @@ class Compared:
 
 
 def same(name: str, *libraries: str) -> dict[str, str]:
-    """The peers whose functions have all this name."""
+    """Return the peers, whose functions all have this name."""
     return dict.fromkeys(libraries, name)
 
 
 def contestants(
     compared: Compared, peers: Sequence[str], whole: plain.Plain, short: plain.Plain, particles: int = 1
 ) -> list[Contestant | Skipped]:
-    """Ours and the peers on the runs of `whole`; the loops see `short`. Work is counted in steps of runs times `particles`."""
+    """Return jaxveh and the peers on the runs of `whole`, and the loops on `short`; work is steps of runs times `particles`."""
     work = whole.measured.shape[0] * (whole.measured.shape[1] - 1) * particles
     made: list[Contestant | Skipped] = [_ours(compared, whole, work)]
     for peer in peers:
@@ -103,7 +103,7 @@ def _ours(compared: Compared, whole: plain.Plain, work: int) -> Contestant:
         channels = {name: y[:, i] for i, name in enumerate(problem.channels)}
         given = {"key": key} if compared.random else {}
         done = drive(compared.filter, model, recording.replace(**channels), **given)
-        # What the peers give, too; XLA leaves out the rest, the info of every row.
+        # The same results as those of the peers; XLA omits the rest, the info of every row.
         total = done.filtered.log_likelihood if compared.smoother else done.log_likelihood
         return done.mean, done.std, total
 
@@ -116,7 +116,7 @@ def _peer(
 ) -> Contestant:
     module = importlib.import_module(f".peers.{name}_filters", __package__)
     build = getattr(module, compared.peers[name])
-    if name in LOOPS:  # slow ones see fewer rows; a time per step does not depend on their number
+    if name in LOOPS:  # slow ones have fewer rows; a time per step does not depend on their number
         run, y = build(short, **compared.settings), short.measured[0]
         given = (lambda index: (y, index)) if compared.random else (lambda index: (y,))
         return Contestant(name, lambda index: run(*given(index)), (len(y) - 1) * particles)

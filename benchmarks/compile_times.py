@@ -1,6 +1,6 @@
-"""From Python functions to machine code: tracing, lowering and compiling, without running.
+"""The time from Python functions to machine code: tracing, lowering and compiling, without running.
 
-Whole programs, cold and warm, are in `python -m benchmarks.starts`: they take all cores, and processes of their own.
+Whole programs, cold and warm, are in `python -m benchmarks.starts`: they use all cores, and separate processes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ OURS = "jaxveh"
 
 
 def cases(smoke: bool) -> list[Case]:
-    """Both particle filters and the unscented filter, and their gradients."""
+    """Return the cases: both particle filters and the unscented filter, and their gradients."""
     kinds = {
         "pf": ("Compiling a bootstrap particle filter, 1000 particles", filters.ParticleFilter(1000)),
         "apf": ("Compiling an auxiliary particle filter, 1000 particles", filters.AuxiliaryParticleFilter(1000)),
@@ -73,7 +73,7 @@ def _build(kind: str, filter_: filters.AbstractFilter) -> Sequence[Contestant | 
 
 
 def _compiling(function: Callable, *arguments: object) -> Callable[[int], object]:
-    """Compile anew in each call: caches are dropped, so that tracing and lowering count as well."""
+    """Return a function that compiles again in each call: caches are cleared, so that tracing and lowering count as well."""
 
     def call(index: int) -> object:
         jax.clear_caches()

@@ -1,4 +1,4 @@
-"""MF-Tyre's slip forces fitted to rig data: ours, already compiled, and scipy's least squares on the NumPy formula."""
+"""MF-Tyre's slip forces fitted to rig data: jaxveh, already compiled, and scipy's least squares on the NumPy formula."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ FORCES = ("F_x", "F_y")
 
 
 def cases(smoke: bool) -> list[Case]:
-    """One fit, pure and combined slip."""
+    """Return the case: one fit to pure and combined slip."""
     count = 200 if smoke else 2000
     return [
         Case(
@@ -48,7 +48,7 @@ def cases(smoke: bool) -> list[Case]:
 
 
 class Rig(NamedTuple):
-    """A problem: contacts, forces measured at them (2, n) in N, and where the coefficients start, by name."""
+    """A problem: contacts, forces measured at them (2, n) in N, and the start values of the coefficients by name."""
 
     contacts: Contacts
     measured: np.ndarray
@@ -56,7 +56,7 @@ class Rig(NamedTuple):
 
 
 def make_rig(count: int, seed: int = 0) -> Rig:
-    """Forces of `COEFFICIENTS` with noise, and a start that misses each coefficient by up to a tenth."""
+    """Return forces of `COEFFICIENTS` with noise, and a start with an error of up to a tenth in each coefficient."""
     rng = np.random.default_rng(seed)
     given = contacts(count, seed)
     c = numpy_mf_tyre.of_type(np.dtype(float), COEFFICIENTS)
@@ -66,7 +66,7 @@ def make_rig(count: int, seed: int = 0) -> Rig:
 
 
 def ours_compiled(rig: Rig) -> tuple[RigProblem, Callable[[], SearchEnd]]:
-    """The problem as the joint stage of `fit_rig` states it, and its fit."""
+    """Return the problem of the joint stage of `fit_rig`, and its fit."""
     law = _started(rig.start)
     parameters = resolve(law, lambda law: [leaf_of(law, name) for name in _names()])
     origin, scale = rig_problem.start_of(law, parameters)
@@ -82,7 +82,7 @@ def ours_compiled(rig: Rig) -> tuple[RigProblem, Callable[[], SearchEnd]]:
 
 
 def by_scipy(rig: Rig, problem: RigProblem, method: str) -> Callable[[], Any]:
-    """The same sum of squares by `scipy.optimize.least_squares`: same coordinates, start and tolerance, forward differences."""
+    """Return the same fit by `scipy.optimize.least_squares`: same coordinates, start and tolerance, forward differences."""
     from scipy.optimize import least_squares
 
     names = [_short(p.name) for p in problem.chosen]
@@ -95,7 +95,7 @@ def by_scipy(rig: Rig, problem: RigProblem, method: str) -> Callable[[], Any]:
         F_x, F_y = numpy_mf_tyre.slip_forces(c, at)
         return np.concatenate([(F_x - rig.measured[0]) / NOISE, (F_y - rig.measured[1]) / NOISE, rig_problem.PULL * z])
 
-    # It stops at the first of its tests, as ours does; the gradient's is put out of the way.
+    # It stops at the first of its tests that holds, as jaxveh does; the test of the gradient is disabled.
     settings = {"ftol": TOLERANCE, "xtol": TOLERANCE, "gtol": 1e-15, "x_scale": 1.0, "method": method}
     return lambda: least_squares(residuals, np.zeros(origin.size), "2-point", **settings)
 
@@ -116,7 +116,7 @@ def _build(count: int, methods: Sequence[str]) -> Sequence[Contestant | Skipped]
 
 
 def _names() -> list[str]:
-    """The coefficients of F_x and F_y that data show in which load, camber and pressure vary."""
+    """Return the coefficients of F_x and F_y that are identifiable from data with varying load, camber and pressure."""
     groups = rig_stages.ALONG, rig_stages.ALONG_COMBINED, rig_stages.ACROSS, rig_stages.ACROSS_COMBINED
     return [name for group in groups for name in group.identifiable({"load", "camber", "pressure"})]
 
@@ -126,5 +126,5 @@ def _started(start: dict[str, float]) -> mf_tyre.MFTyre:
 
 
 def _short(name: str) -> str:
-    """The name in a property file."""
+    """Return the name in a property file."""
     return name.rpartition(".")[2]

@@ -1,8 +1,8 @@
-"""The other particle filters that libraries share: guided, Liu and West's, and paths drawn backwards through the particles.
+"""Further particle filters that several libraries have: guided, Liu and West's, and paths drawn backwards through the particles.
 
-The guided filter of the linear problem draws from the optimal proposal; the peers are given its gain and factor, which are the
-same for all particles. That of the eleven-state problem is linearised for each particle by every contestant. All resample
-before every step, and all weigh by p(y | x) p(x | x') / q(x | x', y), whatever a special proposal would allow.
+The guided filter of the linear problem draws from the optimal proposal; the peers receive its gain and factor, which are the
+same for all particles. For the eleven-state problem every contestant linearises for each particle. All resample before every
+step, and all use weights p(y | x) p(x | x') / q(x | x', y), even if a special proposal would allow simpler ones.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ COEFFICIENTS = tuple(f"{axle}_{letter}" for axle in ("front", "rear") for letter
 
 @dataclass(frozen=True)
 class Kind:
-    """A comparison for every number of particles, `of(count)`, and how many rows go with them."""
+    """A comparison for every number of particles, `of(count)`, and the number of rows."""
 
     of: Callable[[int], Compared]
     rows: int
@@ -75,12 +75,12 @@ FAMILY = {
     "liu-west": Kind(_liu_west, 300),
     "backward-sampling": Kind(_backward, 60, 10),
 }
-# What the smoke run builds, and beside whom.
+# The cases of the smoke run, and their peers.
 SMOKE = {"guided": ("smcx",), "backward-sampling": ("cuthbert", "particles")}
 
 
 def cases(smoke: bool) -> list[Case]:
-    """Every filter for 300, 1000 and 10000 particles, and 64 runs of 300 at once."""
+    """Return every filter for 300, 1000 and 10000 particles, and 64 runs of 300 at once."""
     if smoke:
         return [_case(name, 20, 1, smoke) for name in SMOKE]
     sizes = [(count, 1) for count in COUNTS] + [(FEW, RUNS)]
@@ -105,6 +105,6 @@ def _build(name: str, peers: Sequence[str], count: int, runs: int, smoke: bool) 
     kind = FAMILY[name]
     compared = kind.of(count)
     plain = PROBLEMS[compared.problem].plain
-    # Of many particles or runs fewer rows: a time per step does not depend on their number.
+    # Fewer rows for many particles or runs: a time per step does not depend on their number.
     rows = 8 if smoke else kind.rows if count * runs <= 1000 else max(kind.rows // 5, 20)
     return contestants(compared, peers, plain(rows, runs), plain(min(rows, kind.rows_of_loops), 1), count)

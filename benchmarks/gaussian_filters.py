@@ -1,9 +1,10 @@
-"""Kalman filters and smoothers side by side with every library that has the same one: one run, and 64 at once.
+"""Kalman filters and smoothers side by side with every library that has the same filter: one run, and 64 at once.
 
-Of the linear filters for 64 runs: where a library knows no missing values (dynamax, smcx), the covariances of a linear filter
-do not depend on the measurements, and `vmap` over these alone leaves them out of the batch: all 64 runs share one recursion of
-matrices, and only means are computed for each. Ours, as cuthbert's, may miss another channel in each run and does the whole
-work. As soon as anything but the measurements differs between runs, so do they (see the extended filters).
+About the linear filters for 64 runs: if a library does not support missing values (dynamax, smcx), the covariances of a linear
+filter do not depend on the measurements, and `vmap` over the measurements alone leaves the covariances out of the batch: all 64
+runs share one recursion of matrices, and only means are computed for each. In jaxveh and cuthbert a different channel may be
+missing in each run, and the whole work is done. If anything but the measurements differs between runs, all libraries do it (see
+the extended filters).
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ __all__ = ["COMPARED", "cases"]
 MEMBERS = 300
 ALL = ("dynamax", "smcx", "cuthbert", "filterpy")
 LAG = 10
-# Two modes, alike but for the process noise's standard deviations, and the chance to stay in one for a step.
+# Two modes that differ only in the process noise's standard deviations, and the probability of staying in one for a step.
 RESTLESS, STAY = 4.0, 0.95
 BOUND, SCALES = 0.5, {"v_y": 0.1, "yaw_rate": 0.05}
 
@@ -142,12 +143,12 @@ COMPARED = {
     ),
 }
 
-# What the smoke run builds, and beside whom: each peer once.
+# The cases of the smoke run, and their peers: each peer once.
 SMOKE = {"kalman": ("particles", "cuthbert"), "extended-3": ("dynamax", "filterpy"), "unscented-11": ("smcx",)}
 
 
 def cases(smoke: bool) -> list[Case]:
-    """Every filter for one run and for 64."""
+    """Return every filter for one run and for 64."""
     made = []
     for name, compared in COMPARED.items():
         if smoke and name not in SMOKE:
@@ -172,7 +173,7 @@ def cases(smoke: bool) -> list[Case]:
 
 
 def _shared(compared: Compared, runs: int) -> str:
-    """What the title of a linear filter's many runs says (see the module's text)."""
+    """Return the note in the title for many runs of a linear filter (see the module's text)."""
     return "; dynamax and smcx share covariances" if runs > 1 and compared.problem == "linear" else ""
 
 

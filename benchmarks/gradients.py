@@ -20,7 +20,7 @@ VALUE, GRADIENT = "value", "value and gradient"
 
 
 def cases(smoke: bool) -> list[Case]:
-    """Particle filters of 1000 particles and the unscented filter, float64."""
+    """Return the cases: particle filters of 1000 particles and the unscented filter, float64."""
     count, rows, long = (16, 10, 20) if smoke else (1000, 300, 5000)
     titles = {
         "pf": (f"Bootstrap particle filter, {count} particles", 3.5),

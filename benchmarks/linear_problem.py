@@ -1,4 +1,4 @@
-"""A linear problem for filters that are exact: the motion of a single track with linear tyres, and two sensors that drift."""
+"""A linear problem for exact filters: the motion of a single track with linear tyres, and two sensors that drift."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def _array(*values: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LinearTrack:
-    """Four states at a constant speed; yaw rate and lateral acceleration are measured, each with a slow error of its own.
+    """Four states at a constant speed; yaw rate and lateral acceleration are measured, each with its own slow error.
 
     The states are lateral velocity (m/s), yaw rate (rad/s), then the errors of the yaw rate's (rad/s) and of the
     acceleration's sensor (m/s^2). ``steer`` (rad at the road wheels) is ``(rows,)`` and the same in every run, ``yaw_rate``
@@ -52,7 +52,7 @@ class LinearTrack:
 
     @property
     def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """F (4, 4), B (4,), H (2, 4), D (2,): the motion's exponential series to the fourth order, as Runge-Kutta has it."""
+        """Return F (4, 4), B (4,), H (2, 4), D (2,): the exponential series of the motion to fourth order, as in Runge-Kutta."""
         A, b, h_row, d = self._continuous()
         h, power, F, G = self.step, np.eye(2), np.eye(2), np.eye(2)
         for k in range(1, 5):
@@ -68,7 +68,7 @@ class LinearTrack:
         return whole.astype(dtype), B.astype(dtype), H.astype(dtype), np.array([0.0, d], dtype)
 
     def _continuous(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """d/dt (v_y, r) = A (v_y, r) + b steer, and the acceleration as (v_y, r) times a row plus d steer."""
+        """Return A, b of d/dt (v_y, r) = A (v_y, r) + b steer, and row and d of the acceleration, row (v_y, r) + d steer."""
         c_f, c_r, l_f, l_r, v = self.front_stiffness, self.rear_stiffness, self.front, self.rear, self.speed
         m, inertia = self.mass, self.inertia
         acceleration = np.array([-(c_f + c_r) / (m * v), -(c_f * l_f - c_r * l_r) / (m * v)])
@@ -78,7 +78,7 @@ class LinearTrack:
 
 
 def linear_track(rows: int, runs: int = 1, seed: int = 0, dtype: type = np.float64) -> LinearTrack:
-    """A weave of two frequencies, simulated from the prior's mean; every run has its own noises.
+    """Return a weave of two frequencies, simulated from the prior's mean; every run has its own noises.
 
     The arrays are of ``dtype``; the problem's numbers are rounded to it.
     """

@@ -1,10 +1,10 @@
-"""`python -m benchmarks.live [--steps N] [--json FILE]`: how long one step of a live loop at 100 Hz takes, by the wall clock.
+"""`python -m benchmarks.live [--steps N] [--json FILE]`: the time of one step of a live loop at 100 Hz, by the wall clock.
 
-The single track with eight tyre coefficients, 11 states. A row of plain numbers goes through `model.row` into a jitted
-`filter.step`, whose results are waited for, one row after another. A step's time is split where the call returns: before it
-the host makes the row and hands the work over (dispatch), after it the host waits (computing). What is short JAX may compute
-within the call, on the processor's own thread: then it counts as dispatch. Pinned to one core, as a
-loop in a car would be. On a machine with other work to do the extremes are theirs.
+The problem is the single track with eight tyre coefficients, 11 states. A row of plain numbers goes through `model.row` into a
+jitted `filter.step`, and the loop waits for the results, one row after another. A step's time is split where the call returns:
+before that the host makes the row and starts the work (dispatch), after that the host waits (computing). Short work may be
+computed by JAX within the call, on the calling thread: then it counts as dispatch. The process is pinned to one core, as a loop
+in a car would be. On a machine with other work the extremes are due to that work.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from . import machine
 __all__ = ["BOUND_US", "Latency", "main", "measure"]
 
 BOUND_US = 1000.0
-"""What 99 of 100 steps may take at most (us): a tenth of the period at 100 Hz."""
+"""Bound of the 99th percentile of a step's time (us): a tenth of the period at 100 Hz."""
 
 
 @dataclass(frozen=True)
 class Latency:
-    """Microseconds a step: quantiles and extreme of the whole, and the medians of its two parts."""
+    """Microseconds per step: quantiles and maximum of the whole, and the medians of its two parts."""
 
     name: str
     steps: int
@@ -48,7 +48,7 @@ class Latency:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure and print; returns the exit code."""
+    """Measure and print; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.live", description=__doc__)
     parser.add_argument("--steps", type=int, default=10000, help="steps of each contestant (default 10000)")
     parser.add_argument("--only", default="", help="part of a contestant's name, e.g. APF or float32")
@@ -75,7 +75,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def measure(steps: int, only: str = "") -> list[Latency]:
-    """The latencies of every contestant whose name has `only` in it, one after another."""
+    """Measure the latencies of every contestant with `only` in its name, one after another."""
     import jax
 
     jax.config.update("jax_enable_x64", True)
@@ -83,7 +83,7 @@ def measure(steps: int, only: str = "") -> list[Latency]:
 
 
 def _latency(name: str, step: Callable, rows: Iterator, steps: int) -> Latency:
-    """Steps of `step(row) -> (done after dispatch, wait)` timed one by one, with the garbage collector as it is."""
+    """Time the steps of `step(row) -> (done after dispatch, wait)` one by one, with the garbage collector on as usual."""
     for _ in range(min(steps, 200)):
         step(next(rows))()
     gc.collect()
@@ -104,7 +104,7 @@ def _latency(name: str, step: Callable, rows: Iterator, steps: int) -> Latency:
 
 
 def _contestants() -> Iterator[tuple[str, Callable[[], tuple[Callable, Iterator]]]]:
-    """Names, and what makes a step and the rows that it is fed with."""
+    """Yield names, and functions that make a step and its rows."""
     import numpy as np
 
     from jaxveh import filters
@@ -118,7 +118,7 @@ def _contestants() -> Iterator[tuple[str, Callable[[], tuple[Callable, Iterator]
 
 
 def _drive(dtype: type) -> tuple:
-    """The model, and rows without end as plain numbers: time, inputs, measurements."""
+    """Return the model, and an endless iterator of rows as plain numbers: time, inputs, measurements."""
     from . import ours
     from .problems import single_track
 
@@ -136,8 +136,10 @@ def _drive(dtype: type) -> tuple:
 
 
 def _stepper(filter_: object, dtype: type, *, held: bool = False) -> tuple[Callable, Iterator]:
-    """`filter.step`, jitted, as a live loop calls it: with the model as an argument, which may change from step to step, or
-    `held`, the model's numbers being part of the program."""
+    """Return the jitted `filter.step` in the form for a live loop, and its rows.
+
+    The model is an argument, which may change between steps, or with `held` the model's numbers are part of the program.
+    """
     import equinox as eqx
     import jax
 
@@ -160,7 +162,7 @@ def _stepper(filter_: object, dtype: type, *, held: bool = False) -> tuple[Calla
 
 
 def _exported(filter_: object, dtype: type) -> tuple[Callable, Iterator]:
-    """The program that `export_filter` wrote, called as its documentation says."""
+    """Return the program that `export_filter` wrote, called as in its documentation."""
     import jax
     import jax.export
     import numpy as np
@@ -192,7 +194,7 @@ def _exported(filter_: object, dtype: type) -> tuple[Callable, Iterator]:
 
 
 def _use_precision(dtype: type) -> None:
-    """Where float32 is measured, x64 is off, as it is for a user who works in float32; for all that this process does next."""
+    """Switch x64 off for float32, as a user of float32 would, for the rest of the process."""
     import jax
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""One core, one thread, known flags: what must be set before NumPy and JAX are imported, and what a result must state."""
+"""One core, one thread, known flags: settings before NumPy and JAX are imported, and the description of the machine."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 __all__ = ["describe", "prepare"]
 
 VECTOR_WIDTH_FLAG = "--xla_cpu_prefer_vector_width=512"
-# Compiles in less than half of the time, what runs slower: for runs that measure nothing.
+# Compiles in less than half of the time, programs that run slower: for runs without measurements.
 QUICKLY_COMPILED = " ".join(
     (
         "--xla_cpu_use_fusion_emitters=false",
@@ -38,11 +38,11 @@ PACKAGES = (
 
 
 def prepare(core: int | None, smoke: bool = False) -> int | None:
-    """Pin this process to one core (by default the last it may use) and set flags; returns the core, None where impossible.
+    """Pin this process to one core (by default the last it may use) and set flags; return the core, None if impossible.
 
-    A `smoke` run compiles quickly where this version of XLA is known to have the flags: an unknown one ends the process.
+    A `smoke` run compiles quickly if this version of XLA is known to have the flags: an unknown flag ends the process.
 
-    Must run before NumPy or JAX are imported, because they read thread counts and flags only once.
+    It must run before NumPy or JAX are imported, because they read thread counts and flags only once.
     """
     for module in ("numpy", "jax"):
         if module in sys.modules:
@@ -67,7 +67,7 @@ def prepare(core: int | None, smoke: bool = False) -> int | None:
 
 
 def describe(core: int | None) -> dict[str, object]:
-    """Versions, processor and settings, for the report."""
+    """Return versions, processor and settings for the report."""
     versions = {}
     for package in PACKAGES:
         try:

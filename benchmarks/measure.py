@@ -1,4 +1,4 @@
-"""Round-robin timing: every round runs every contestant once, so that a slow spell of the machine hits them all alike."""
+"""Round-robin timing: every round runs every contestant once, so that a slow period of the machine affects all equally."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["Bound", "Case", "Contestant", "Samples", "Skipped", "Spread", "measu
 
 @dataclass(frozen=True)
 class Contestant:
-    """Something to be timed: `call(round)` does the work and returns when it is done; `units` is how much work that is."""
+    """A contestant: `call(round)` does the work and returns when it is done; `units` is the amount of work."""
 
     name: str
     call: Callable[[int], object]
@@ -22,7 +22,7 @@ class Contestant:
 
 @dataclass(frozen=True)
 class Skipped:
-    """A contestant that cannot run here, and why."""
+    """A contestant that cannot run here, and the reason."""
 
     name: str
     reason: str
@@ -30,7 +30,7 @@ class Skipped:
 
 @dataclass(frozen=True)
 class Bound:
-    """`contestant` may take at most `limit` times what the fastest of `references` takes."""
+    """A bound: `contestant` may take at most `limit` times the time of the fastest of `references`."""
 
     contestant: str
     references: tuple[str, ...]
@@ -47,7 +47,7 @@ class Case:
     build: Callable[[], Sequence[Contestant | Skipped]]
     base: str
     bounds: tuple[Bound, ...] = ()
-    # Compile times must not be warmed up: the first call is what is timed.
+    # Compile times need no warm-up: the first call is timed.
     warm: bool = True
 
 
@@ -63,7 +63,7 @@ class Spread:
 
     @classmethod
     def of(cls, values: Sequence[float]) -> Spread:
-        """The spread of at least one number."""
+        """Return the spread of at least one number."""
         if len(values) == 1:
             return cls(*[values[0]] * 5)
         lower, median, upper = statistics.quantiles(values, n=4, method="inclusive")
@@ -72,7 +72,7 @@ class Spread:
 
 @dataclass
 class Samples:
-    """Nanoseconds per unit of work of one contestant, one number a round: on the chosen clock, and by the wall clock."""
+    """Nanoseconds per unit of work of one contestant, one number per round: on the chosen clock, and by the wall clock."""
 
     contestant: Contestant
     repeats: int
@@ -83,10 +83,10 @@ class Samples:
 def measure(
     contestants: Sequence[Contestant], *, rounds: int, seconds: float, cpu_time: bool, warm: bool = True
 ) -> list[Samples]:
-    """Time all contestants in turn, `rounds` times, at least `seconds` a sample (by repeating short calls).
+    """Time all contestants in turn, `rounds` times, with at least `seconds` per sample (by repeating short calls).
 
-    The order rotates from round to round. With `cpu_time` the clock is the CPU time of all threads of this process: on a core
-    that is shared with other programs it leaves out what they take. Pin the process first.
+    The order rotates from round to round. With `cpu_time` the clock is the CPU time of all threads of this process, which
+    excludes the time of other programs on a shared core. Pin the process first.
     """
     clock = time.process_time if cpu_time else time.perf_counter
     samples = []

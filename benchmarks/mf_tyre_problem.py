@@ -1,4 +1,4 @@
-"""A tyre with every coefficient of MF-Tyre 6.1 at work, and contacts all over its ranges."""
+"""A tyre in which every coefficient of MF-Tyre 6.1 has an effect, and contacts over all of its ranges."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 __all__ = ["COEFFICIENTS", "Contacts", "contacts"]
 
-# An invented passenger-car tyre of round numbers: no term is zero, so that none can be left out.
+# An invented passenger-car tyre with round numbers: no term is zero, so that none can be omitted unnoticed.
 _TYRE = {
     "UNLOADED_RADIUS": 0.32, "FNOMIN": 4500.0, "LONGVL": 16.7, "NOMPRES": 220e3,
     "KPUMIN": -0.8, "KPUMAX": 0.8, "ALPMIN": -0.7, "ALPMAX": 0.7, "CAMMIN": -0.15, "CAMMAX": 0.15,
@@ -62,7 +62,7 @@ class Contacts(NamedTuple):
 
 
 def contacts(count: int, seed: int = 0, dtype: type = np.float64) -> Contacts:
-    """Uniform over a little more than the tyre's ranges, so that every limit holds a few; a few roll slower than VXLOW."""
+    """Draw contacts uniformly over slightly more than the tyre's ranges, so that every limit and VXLOW apply to a few."""
     rng = np.random.default_rng(seed)
     edges = [(-0.8, 0.8), (-0.9, 0.9), (100.0, 12e3), (-0.17, 0.17), (0.3, 1.1), (0.2, 60.0), (150e3, 310e3)]
     return Contacts(*[rng.uniform(low, high, count).astype(dtype) for low, high in edges])

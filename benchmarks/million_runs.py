@@ -1,9 +1,9 @@
 """`python -m benchmarks.million_runs [--runs N] [--cars N] [--processes N]`: sweeps with a store, at scale.
 
 A million log-likelihoods of the unscented filter of three states (20 rows each), and 10,000 drives of the 7-DOF car (100 rows of
-ten steps); each at a tenth of that and in full, so that what grows with the runs shows. By the wall clock, on all cores:
-seconds, runs a second, megabytes at most of this process and of its largest worker, and the store's size; then what a store costs
-in one process.
+ten steps); each with a tenth of the runs and with all, to show what grows with their number. By the wall clock, on all cores:
+seconds, runs per second, largest memory of this process and of its largest worker in megabytes, and the store's size; then the
+cost of a store in one process.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ __all__ = ["main"]
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure and print; returns the exit code."""
+    """Measure and print; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.million_runs", description=__doc__)
     parser.add_argument("--runs", type=int, default=1_000_000, help="runs of the filter (default 1,000,000)")
     parser.add_argument("--cars", type=int, default=10_000, help="drives of the 7-DOF car (default 10,000)")
@@ -61,7 +61,7 @@ def _line(title: str, run: Callable, runs: int, batch: int, processes: int) -> s
 
 
 def _overhead(run: Callable, runs: int, batch: int) -> str:
-    """What a store costs in one process, by turns with none: compiled programs are kept, so that neither compiles."""
+    """Return the cost of a store in one process, alternating with none: compiled programs are kept, so that neither compiles."""
     import jax
 
     with tempfile.TemporaryDirectory() as folder:
@@ -88,7 +88,7 @@ def _seconds(run: Callable, runs: int, batch: int, **options: object) -> float:
 
 
 def filter_once(point: object, key: object) -> dict[str, object]:
-    """The log-likelihood of one simulated log."""
+    """Return the log-likelihood of one simulated log."""
     import jax
     import numpy as np
 
@@ -106,7 +106,7 @@ def filter_once(point: object, key: object) -> dict[str, object]:
 
 
 def car_once(point: object, key: object) -> dict[str, object]:
-    """Where a drive of the 7-DOF car ends that begins at a speed of its own, and how it turns at most."""
+    """Return the final yaw of a drive of the 7-DOF car from a random speed, and its largest yaw rate."""
     import jax
     import jax.numpy as jnp
     import numpy as np

@@ -1,4 +1,4 @@
-"""The problems for the library, written as a user would write them: names, short formulas, the public interface."""
+"""The problems for jaxveh, written as a user would write them: names, short formulas, the public interface."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ __all__ = [
 
 
 def precision(dtype: np.typing.DTypeLike):
-    """Where float32 is measured, x64 is off, as it is for a user who works in float32."""
+    """Switch x64 off for float32, as a user of float32 would."""
     return jax.enable_x64(np.dtype(dtype) == np.float64)
 
 
@@ -61,7 +61,7 @@ class Car(NamedTuple):
 
 
 class Chassis(eqx.Module):
-    """What is known of the car."""
+    """The known numbers of the car."""
 
     mass: jax.Array
     inertia: jax.Array
@@ -113,7 +113,7 @@ def _observation(chassis, t, x, u):
 
 
 def single_track_model(problem: SingleTrack, dtype: np.typing.DTypeLike) -> statespace.StateSpace:
-    """The eleven states with noise on each, yaw rate and lateral acceleration measured."""
+    """Return the model of eleven states with noise on each; yaw rate and lateral acceleration are measured."""
     p = problem
     model = statespace.StateSpace(
         system=Chassis(*(jnp.asarray(v, dtype) for v in (p.mass, p.inertia, p.front, p.rear))),
@@ -128,17 +128,17 @@ def single_track_model(problem: SingleTrack, dtype: np.typing.DTypeLike) -> stat
 
 
 def constant_parameters_model(problem: SingleTrack, dtype: np.typing.DTypeLike) -> statespace.StateSpace:
-    """The same with noise on the motion alone: the coefficients are constants."""
+    """Return the same model with noise on the motion alone: the coefficients are constant."""
     std = dict(zip(Motion._fields, map(float, problem.process_std[:3]), strict=True))
     noise = statespace.cast(statespace.Discrete(statespace.Gaussian(std)), dtype)
     return eqx.tree_at(lambda model: model.process_noise, single_track_model(problem, dtype), noise)
 
 
 def vehicle_model(problem: SingleTrack, dtype: np.typing.DTypeLike) -> statespace.StateSpace:
-    """The same state space from the library's own vehicle, tyres and sensors.
+    """Return the same state space from the library's own vehicle, tyres and sensors.
 
-    Its parameters walk additively (`Real`), as the other contestants' do. Its front slip angle is that of the turned
-    wheel's own axes, a rotation more than the paper's formula, which for given v_x is the same angle.
+    Its parameters have additive random walks (`Real`), as those of the other contestants. Its front slip angle is computed in the
+    axes of the steered wheel, one rotation more than the paper's formula, which gives the same angle for given v_x.
     """
     p = problem
     front, rear = (tyres.MagicFormula(B=B, C=C, D=D, E=E) for D, C, B, E in p.prior_mean[3:].reshape(2, 4))
@@ -160,14 +160,14 @@ def vehicle_model(problem: SingleTrack, dtype: np.typing.DTypeLike) -> statespac
 
 
 def _relative(problem: SingleTrack, std: np.ndarray) -> dict[str, float]:
-    """Spreads of the coefficients as the library takes them: shares of the value, for E of its scale, which is 2."""
+    """Return the spreads of the coefficients in the library's form: shares of the value, and for E of its scale, which is 2."""
     names = [f"{axle}.{letter}" for axle in ("front", "rear") for letter in "DCBE"]
     values = [2.0 if name.endswith("E") else float(v) for name, v in zip(names, problem.prior_mean[3:], strict=True)]
     return {name: float(s) / v for name, s, v in zip(names, std[3:], values, strict=True)}
 
 
 def single_track_recording(problem: SingleTrack) -> jaxveh.Recording:
-    """The measurements as a recording."""
+    """Return the measurements as a recording."""
     channels = {
         "steer": problem.steer,
         "v_x": problem.speed,
@@ -186,13 +186,13 @@ class Vehicle(NamedTuple):
 
 
 class Speed(NamedTuple):
-    """The speed alone: mass and grade stay as they are within a step."""
+    """The speed alone: mass and grade are constant within a step."""
 
     v: object
 
 
 class Truck(eqx.Module):
-    """What is known of the vehicle; drag is rho c_d A / 2."""
+    """The known numbers of the vehicle; drag is rho c_d A / 2."""
 
     wheel_radius: jax.Array
     gravity: jax.Array
@@ -220,7 +220,7 @@ def _speed_observation(truck, t, x, u):
 
 
 def speed_model(problem: SpeedAndMass, dtype: np.typing.DTypeLike) -> statespace.StateSpace:
-    """Speed, mass and grade with noise on each, the speed measured."""
+    """Return the model of speed, mass and grade with noise on each; the speed is measured."""
     p = problem
     model = statespace.StateSpace(
         system=Truck(*(jnp.asarray(v, dtype) for v in (p.wheel_radius, p.gravity, p.rolling_resistance, p.drag))),
@@ -270,7 +270,7 @@ def _linear_observation(line, t, x, u):
 
 
 def linear_model(problem: LinearTrack, dtype: np.typing.DTypeLike) -> statespace.StateSpace:
-    """Lateral motion with linear tyres, the sensors' errors as states, noise on each."""
+    """Return the model of lateral motion with linear tyres, with the sensors' errors as states and noise on each."""
     p = problem
     F, B, H, D = p.matrices
     rows = (*zip(F[:2, :2], B[:2], strict=True), (H[1, :2], D[1]))
@@ -302,5 +302,5 @@ def _by_name(state: type, values: np.ndarray) -> dict[str, float]:
 
 
 def blocked(function: Callable[[int], object]) -> Callable[[int], object]:
-    """The function, waiting until its arrays are there."""
+    """Return the function with a wait until its arrays are computed."""
     return lambda index: jax.block_until_ready(function(index))

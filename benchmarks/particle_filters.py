@@ -1,4 +1,4 @@
-"""Bootstrap and auxiliary particle filter on the eleven-state single track."""
+"""Bootstrap and auxiliary particle filters on the eleven-state single track."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ __all__ = ["cases"]
 VEHICLE, OWN_MODEL, LIMIT = "jaxveh", "jaxveh, own model", "C++ limit"
 PEERS = ("particles", "smcx", "cuthbert")
 
-# What a step may cost over the limit, by precision.
+# Bounds of the time per step over that of the limit, by precision.
 BOUNDS = {"float64": 1.6, "float32": 2.6}
-# With fewer particles a step's fixed cost shows, which the limit does not have.
+# With fewer particles the fixed cost of a step matters, which the limit does not have.
 FEW = 300
 RUNS = 64
 
 
 def cases(smoke: bool) -> list[Case]:
-    """Both filters in both precisions for 300, 1000 and 10000 particles, and 64 runs of 300 at once."""
+    """Return both filters in both precisions for 300, 1000 and 10000 particles, and 64 runs of 300 at once."""
     if smoke:
         return [_case("pf", "float64", 64, smoke), _case("apf", "float32", 64, smoke)]
     made = []
@@ -73,12 +73,12 @@ def _case_of_many(kind: str, dtype: str) -> Case:
 def _filter(auxiliary: bool, count: int) -> filters.AbstractParticleFilter:
     if not auxiliary:
         return filters.ParticleFilter(count)
-    # What the limit and the peers do: they look ahead to a point.
+    # Like the limit and the peers, it looks ahead to a point.
     return filters.AuxiliaryParticleFilter(count, lookahead=filters.PointLookahead())
 
 
 def _build(auxiliary: bool, dtype: np.dtype, count: int, smoke: bool) -> Sequence[Contestant | Skipped]:
-    # Slow contestants see fewer rows; a time per particle-step does not depend on their number.
+    # Slow contestants have fewer rows; a time per particle-step does not depend on their number.
     rows, few = (20, 10) if smoke else (700, 60)
     problem, short = (single_track(n, dtype=dtype.type) for n in (rows, few))
     work, little = count * (rows - 1), count * (few - 1)

@@ -1,4 +1,4 @@
-"""The problems of the Gaussian filters as plain arrays and functions of vectors, as other libraries want them."""
+"""The problems of the Gaussian filters as plain arrays and functions of vectors, the form for other libraries."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Plain(NamedTuple):
     """A state-space model without names, in NumPy arrays of one precision, with the measurements of every run.
 
     ``transition(x, u) -> x`` and ``observation(x, u) -> y`` are functions of JAX vectors (n,) and (k,), ``moved`` and
-    ``seen`` the same in NumPy. Row t of ``inputs`` (rows, k) holds what led into row t, and what the sensors see there.
+    ``seen`` the same in NumPy. Row t of ``inputs`` (rows, k) has the inputs of the step into row t and of its measurement.
     ``mean`` (n,), ``covariance`` and ``process`` (n, n), ``noise`` (m, m), ``measured`` (runs, rows, m). ``matrices``:
-    F (n, n), B (n, k), H (m, n), D (m, k) of a linear model, else None. ``problem`` is what it is made of.
+    F (n, n), B (n, k), H (m, n), D (m, k) of a linear model, otherwise None. ``problem`` is the original problem.
     """
 
     transition: Callable
@@ -38,7 +38,7 @@ class Plain(NamedTuple):
 
 
 def linear(rows: int, runs: int = 1, dtype: type = np.float64) -> Plain:
-    """The linear single track, four states and two sensors."""
+    """Return the linear single track, with four states and two sensors."""
     p = linear_track(rows, runs, dtype=dtype)
     F, b, H, d = p.matrices
     nothing = np.zeros_like
@@ -51,7 +51,7 @@ def linear(rows: int, runs: int = 1, dtype: type = np.float64) -> Plain:
 
 
 def speed(rows: int, runs: int = 1, dtype: type = np.float64) -> Plain:
-    """Speed, mass and grade: three states and one sensor."""
+    """Return the problem of speed, mass and grade, with three states and one sensor."""
     p = speed_and_mass(rows, runs, dtype=dtype)
     transition, observation = jax_models.speed_functions(p)
     moved = lambda x, u: p.transition(x, u[0])
@@ -61,7 +61,7 @@ def speed(rows: int, runs: int = 1, dtype: type = np.float64) -> Plain:
 
 
 def track(rows: int, runs: int = 1, dtype: type = np.float64) -> Plain:
-    """The single track with eight tyre coefficients: eleven states and two sensors."""
+    """Return the single track with eight tyre coefficients, with eleven states and two sensors."""
     problems = [single_track(rows, seed, dtype) for seed in range(runs)]
     p = problems[0]
     functions = jax_models.single_track_functions(p)
@@ -87,7 +87,7 @@ def track(rows: int, runs: int = 1, dtype: type = np.float64) -> Plain:
 
 
 def _before(values: np.ndarray) -> np.ndarray:
-    """The value of the row before, and the first's own in the first."""
+    """Return the values of the previous row; the first row keeps its own."""
     return np.concatenate([values[:1], values[:-1]])
 
 

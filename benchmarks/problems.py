@@ -53,13 +53,13 @@ class SingleTrack:
         return len(self.steer)
 
     def axle_forces(self, x: np.ndarray, steer: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
-        """Lateral force of the front axle along the car's y, and of the rear axle, (N,) each, from states (11, N)."""
+        """Return the lateral forces of front axle (along the car's y) and rear axle, (N,) each, from states (11, N)."""
         front = steer - np.arctan((x[0] + self.front * x[2]) / speed)
         rear = -np.arctan((x[0] - self.rear * x[2]) / speed)
         return _magic_formula(front, *x[3:7]) * np.cos(steer), _magic_formula(rear, *x[7:11])
 
     def transition(self, x: np.ndarray, steer: float, speed: float) -> np.ndarray:
-        """One Runge-Kutta step without noise, (11, N) to (11, N)."""
+        """Return the states after one Runge-Kutta step without noise, (11, N) to (11, N)."""
 
         def slope(v_y: np.ndarray, r: np.ndarray) -> np.ndarray:
             front, rear = self.axle_forces(np.stack([v_y, x[1], r, *x[3:]]), steer, speed)
@@ -79,7 +79,7 @@ class SingleTrack:
         return np.concatenate([x[:3] + h / 6 * (k1 + 2 * (k2 + k3) + k4), x[3:]])
 
     def log_likelihood(self, x: np.ndarray, row: int) -> np.ndarray:
-        """log p(y_row | x), (N,), from states (11, N)."""
+        """Return log p(y_row | x), (N,), from states (11, N)."""
         front, rear = self.axle_forces(x, self.steer[row], self.speed[row])
         r = (x[2] - self.yaw_rate[row]) / self.yaw_rate_std
         a = ((front + rear) / self.mass - self.lateral_acceleration[row]) / self.lateral_acceleration_std
@@ -92,7 +92,7 @@ def _magic_formula(slip: np.ndarray, D: np.ndarray, C: np.ndarray, B: np.ndarray
 
 
 def single_track(rows: int, seed: int = 0, dtype: type = np.float64) -> SingleTrack:
-    """A weave of two frequencies at 25 m/s, simulated from the prior's mean with measurement noise.
+    """Return a weave of two frequencies at 25 m/s, simulated from the prior's mean with measurement noise.
 
     The arrays are of ``dtype``; the problem's numbers are rounded to it.
     """
@@ -147,7 +147,7 @@ class SpeedAndMass:
         return self.speed.shape[1]
 
     def transition(self, x: np.ndarray, torque: float) -> np.ndarray:
-        """One Runge-Kutta step without noise, (3, N) to (3, N); ``drag`` is rho c_d A / 2 (kg/m)."""
+        """Return the states after one Runge-Kutta step without noise, (3, N) to (3, N); ``drag`` is rho c_d A / 2 (kg/m)."""
         v, mass, grade = x
         pull = torque / (self.wheel_radius * mass)
         slope_force = self.gravity * (self.rolling_resistance * np.cos(grade) + np.sin(grade))
@@ -166,7 +166,7 @@ class SpeedAndMass:
 def speed_and_mass(
     rows: int, runs: int = 1, seed: int = 0, dtype: type = np.float64, beta: float = 2.0
 ) -> SpeedAndMass:
-    """A slowly varying pull, simulated from the prior's mean; every run has its own measurement noise.
+    """Return a drive with a slowly varying torque, simulated from the prior's mean; every run has its own measurement noise.
 
     With ``beta = 0`` the centre point of the unscented transform has no weight at all (a cubature filter).
     """

@@ -1,4 +1,4 @@
-"""What was measured, as numbers for JSON and as a table for people."""
+"""The measurements as numbers for JSON and as a printed table."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _SCALES = {"ns": 1.0, "us": 1e3, "ms": 1e6, "s": 1e9}
 def case_report(
     case: Case, samples: Sequence[Samples], skipped: Sequence[Skipped], *, smoke: bool = False
 ) -> dict[str, object]:
-    """All numbers of one case; ratios are taken within each round, and spread over the rounds."""
+    """Return all numbers of one case; ratios are taken within each round, and their spread over the rounds."""
     scale = _SCALES[case.unit.split()[0]]
     by_name = {s.contestant.name: s for s in samples}
     base = by_name.get(case.base)
-    bounds = () if smoke else case.bounds  # tiny sizes say nothing about speed
+    bounds = () if smoke else case.bounds  # tiny sizes have no meaning for speed
     contestants = []
     for s in samples:
         contestants.append(
@@ -46,7 +46,7 @@ def case_report(
 
 
 def _ratios(sample: Samples, references: Sequence[Samples]) -> list[float]:
-    """In each round, the time over that of the reference whose median is least."""
+    """Return the time in each round over that of the reference with the lowest median."""
     best = min(references, key=lambda r: Spread.of(r.times).median)
     return [t / b for t, b in zip(sample.times, best.times, strict=True)]
 
@@ -67,7 +67,7 @@ def _check(case: Case, bound: Bound, by_name: dict[str, Samples]) -> dict[str, o
 
 
 def render(report: dict[str, object]) -> None:
-    """Print one case: a rich table where rich is installed, else plain text."""
+    """Print one case: a rich table if rich is installed, otherwise plain text."""
     head = ["", report["unit"], "quartiles", f"over {report['base']}" if report["base"] else "", "quartiles"]
     rows = [_row(c) for c in report["contestants"]]
     rows += [[s["name"], "skipped", s["reason"], "", ""] for s in report["skipped"]]

@@ -1,4 +1,4 @@
-"""Drives of the car of seven degrees of freedom: the numbers that every contestant simulates."""
+"""Drives of the car with seven degrees of freedom: the problem that every contestant simulates."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ STATES = ("v_x", "v_y", "yaw", "yaw_rate", "omega_fl", "omega_fr", "omega_rl", "
 
 @dataclass(frozen=True)
 class Drives:
-    """A sine steer with a constant torque on all wheels, of cars that differ in speed, mass and tyres.
+    """A sine steer with a constant torque on all wheels, for cars that differ in speed, mass and tyres.
 
     Arrays are (runs,). States are saved after every `steps_a_row` steps of `step` s. `amplitude` (rad at the road wheels),
     `frequency` (Hz), `drive_torque` (N m, of all wheels together). Tyres: F = `friction` load sin(C arctan(B s - ...)).
@@ -60,12 +60,12 @@ class Drives:
         return self.rows * self.steps_a_row
 
     def steer(self, t: np.ndarray) -> np.ndarray:
-        """Steer angle, rad, at times in s."""
+        """Return the steer angle, rad, at times in s."""
         return self.amplitude * np.sin(2 * np.pi * self.frequency * t)
 
 
 def drives(runs: int, rows: int, seed: int = 0) -> Drives:
-    """Cars of 1300 to 1700 kg at 15 to 30 m/s on tyres that differ by a tenth."""
+    """Return drives of cars of 1300 to 1700 kg at 15 to 30 m/s on tyres that differ by a tenth."""
     rng = np.random.default_rng(seed)
     between = lambda low, high: rng.uniform(low, high, runs)
     return Drives(

@@ -26,7 +26,7 @@ BOUNDS = {"float64": 1.3, "float32": 1.6}
 
 
 class Inputs(NamedTuple):
-    """What the driver does: steer in rad, torques of all wheels in N m."""
+    """The driver's inputs: steer in rad, torques of all wheels in N m."""
 
     steer: object
     drive_torque: object
@@ -34,7 +34,7 @@ class Inputs(NamedTuple):
 
 
 def car(problem: Drives, dtype: np.typing.DTypeLike) -> vehicles.SevenDOF:
-    """The cars of all drives as one, with arrays where they differ."""
+    """Return the cars of all drives as one car, with arrays where they differ."""
     p = problem
     number = lambda value: jnp.asarray(value if p.runs > 1 else np.squeeze(value), dtype)
     tyre = lambda stiffness, friction: tyres.IsotropicMagicFormula(
@@ -57,7 +57,7 @@ def simulate(
     solver: diffrax.AbstractSolver | None = None,
     block: int | None = BLOCK,
 ):
-    """States of every row, leaves (rows + 1, runs) or (rows + 1,), from drives' speeds, (runs,) or a scalar, in m/s."""
+    """Return the states of every row, leaves (rows + 1, runs) or (rows + 1,), for speeds (runs,) or a scalar, in m/s."""
     p = problem
 
     def inputs(t):
@@ -74,19 +74,19 @@ def simulate(
 
 
 def mean_square(problem: Drives, chosen: tuple, cars: vehicles.SevenDOF, speed: jax.Array, truth) -> jax.Array:
-    """Mean squared distance of yaw rate and lateral velocity from `truth`; `chosen` are mass, front and rear tyre."""
+    """Return the mean squared distance of yaw rate and lateral velocity from `truth`; `chosen`: mass, front and rear tyre."""
     cars = eqx.tree_at(chosen_of, cars, chosen)
     x = simulate(problem, cars, speed, statespace.RolledRK4(), block=None)
     return jnp.mean((x.yaw_rate - truth.yaw_rate) ** 2) + jnp.mean((x.v_y - truth.v_y) ** 2)
 
 
 def chosen_of(cars: vehicles.SevenDOF) -> tuple:
-    """What gradients are taken of."""
+    """Return the numbers with respect to which gradients are taken."""
     return cars.mass, cars.front, cars.rear
 
 
 def cases(smoke: bool) -> list[Case]:
-    """Many drives in both precisions, one drive, the gradient of many."""
+    """Return the cases: many drives in both precisions, one drive, the gradient of many."""
     runs, rows, one, few = (16, 2, 3, 4) if smoke else (1000, 100, 1000, 100)
     made = [
         Case(
@@ -163,7 +163,7 @@ def _limit(problem: Drives, dtype: np.dtype) -> Contestant | Skipped:
 
 
 def gradient_arguments(problem: Drives) -> tuple:
-    """Arguments of `mean_square` after the problem: chosen numbers a hundredth off, one a run."""
+    """Return the arguments of `mean_square` after the problem: chosen numbers with an error of one per cent, one per run."""
     cars, speed = _arguments(problem, np.dtype(np.float64))
     truth = jax.jit(functools.partial(simulate, problem))(cars, speed)
     chosen = jax.tree.map(lambda leaf: jnp.broadcast_to(1.01 * leaf, speed.shape), chosen_of(cars))

@@ -1,8 +1,8 @@
-"""`python -m benchmarks.starts [--only NAME] [--rounds N] [--json FILE]`: how long programs take from their start to their end.
+"""`python -m benchmarks.starts [--only NAME] [--rounds N] [--json FILE]`: the time of programs from their start to their end.
 
-Each is a process of its own, on all cores, by the wall clock: cold, with an empty folder of compiled programs, and warm, with
-what the cold start left there. Of it: importing; tracing and lowering, which every start does; compiling, or reading back what
-was compiled; and the rest, which is mostly the work itself. Where two threads do that at once, it counts once.
+Each is a separate process on all cores, measured by the wall clock: cold, with an empty folder of compiled programs, and warm,
+with the programs of the cold start. The parts are importing; tracing and lowering, which every start does; compiling, or reading
+compiled programs back; and the rest, which is mostly the work itself. Time in which two threads do the same part counts once.
 """
 
 from __future__ import annotations
@@ -65,14 +65,14 @@ rear_cornering_stiffness = 100000.0
 
 
 class Start(NamedTuple):
-    """Seconds of one start: in all, and by part."""
+    """Seconds of one start: the whole, and by part."""
 
     whole: float
     parts: dict[str, float]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure and print; returns the exit code."""
+    """Measure and print; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.starts", description=__doc__)
     parser.add_argument("--only", default="", help=f"part of a program's name: {', '.join(PROGRAMS)}")
     parser.add_argument("--rounds", type=int, default=3, help="cold and warm starts of each (default 3)")
@@ -112,7 +112,7 @@ def _line(title: str, found: Sequence[Start]) -> str:
 
 
 def start(command: Sequence[str], kept: Path) -> Start:
-    """Run `jaxveh` with these arguments as a process that keeps its compiled programs in a folder; raises where it fails."""
+    """Run `jaxveh` with these arguments as a process that keeps its compiled programs in a folder; raise if it fails."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("JAX_", "XLA_"))}
     with tempfile.TemporaryDirectory() as folder:
         said = Path(folder) / "spans.json"
@@ -126,14 +126,14 @@ def start(command: Sequence[str], kept: Path) -> Start:
             raise RuntimeError(f"jaxveh {' '.join(command)} ended with {done.returncode}: {done.stderr[-2000:]}")
         spans = json.loads(said.read_text())
     parts = {part: covered([(a, b) for kind, a, b in spans if kind == part]) for part in PARTS}
-    # Reading back is part of what jax calls compiling.
+    # Reading back is part of the time that jax reports as compiling.
     parts["compile"] = max(parts["compile"] - parts["read"], 0.0)
     parts["rest"] = whole - covered([(a, b) for _, a, b in spans])
     return Start(whole, parts)
 
 
 def covered(spans: Sequence[tuple[float, float]]) -> float:
-    """How long at least one of these spans lasts: those inside others, or beside them, count once."""
+    """Return the length of the union of these spans: overlaps count once."""
     whole, reached = 0.0, float("-inf")
     for a, b in sorted(spans):
         whole += max(0.0, b - max(a, reached))
@@ -142,7 +142,7 @@ def covered(spans: Sequence[tuple[float, float]]) -> float:
 
 
 def _log(folder: Path) -> list[str]:
-    """A log and its car's file, simulated once."""
+    """Return a log and its car file, simulated once."""
     car, log = folder / "car.toml", folder / "drive.csv"
     if not log.exists():
         car.write_text(CAR)
@@ -151,7 +151,7 @@ def _log(folder: Path) -> list[str]:
 
 
 def _rig(folder: Path) -> str:
-    """Sweeps of slip angle at four loads, by a Magic Formula with a peak that falls with the load, and noise; signs of ISO-W."""
+    """Write sweeps of slip angle at four loads: a Magic Formula with load-dependent peak, plus noise, in the signs of ISO-W."""
     rng, lines = np.random.default_rng(0), ["Fz [N],alpha [rad],kappa,gamma [rad],Vx [m/s],Fy [N]"]
     for load in (1500.0, 3000.0, 4500.0, 6000.0):
         slip = np.linspace(-0.2, 0.2, 200)

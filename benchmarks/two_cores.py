@@ -1,8 +1,8 @@
-"""`python -m benchmarks.two_cores [--runs N] [--rounds N]`: what a second core gives 1000 drives of the 7-DOF car.
+"""`python -m benchmarks.two_cores [--runs N] [--rounds N]`: the gain from a second core for 1000 drives of the 7-DOF car.
 
-XLA does not use it by itself: `shard_map` over two host devices does. Wall time, not pinned to a core, so that it stands
-apart from the other benchmarks; the machine should have nothing else to do. The processors' time over the wall time says
-whether it had: 1 with one device and 2 with two. Beside other programs both threads may well share one core, at 1 and 1.
+XLA does not use a second core by itself; `shard_map` over two host devices does. The benchmark measures wall time and is not
+pinned to a core, and is therefore separate from the others; no other work should run on the machine. The processors' time over
+the wall time shows that: it is 1 with one device and 2 with two. With other programs both threads may share one core, at 1 and 1.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ __all__ = ["Time", "main", "measure"]
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure and print; returns the exit code."""
+    """Measure and print; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.two_cores", description=__doc__)
     parser.add_argument("--runs", type=int, default=1000, help="drives, an even number (default 1000)")
     parser.add_argument("--rows", type=int, default=100, help="rows of ten steps (default 100)")
@@ -45,19 +45,19 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 class Time(NamedTuple):
-    """Seconds by the clock, and of all processors."""
+    """Seconds of wall time, and of all processors."""
 
     wall: float
     processors: float
 
     @property
     def busy(self) -> float:
-        """How many processors worked."""
+        """The mean number of busy processors."""
         return self.processors / self.wall
 
 
 def measure(runs: int, rows: int, rounds: int) -> list[tuple[Time, Time]]:
-    """Times of one device and of two, a pair a round; both give the same states, or it raises."""
+    """Return times of one device and of two, one pair per round; raise if their states differ."""
     import jax
     import numpy as np
 
@@ -69,7 +69,7 @@ def measure(runs: int, rows: int, rounds: int) -> list[tuple[Time, Time]]:
 
 
 def contestants(runs: int, rows: int) -> tuple[Callable[[], object], Callable[[], object]]:
-    """All drives on one device, and half of them on each of two."""
+    """Return functions that run all drives on one device, and half of them on each of two."""
     import jax
     import jax.numpy as jnp
     import numpy as np
@@ -84,7 +84,7 @@ def contestants(runs: int, rows: int) -> tuple[Callable[[], object], Callable[[]
     run = functools.partial(simulation.simulate, problem)
     mesh = Mesh(jax.devices()[:2], "runs")
     parts = jax.tree.map(lambda leaf: P("runs") if leaf.ndim else P(), (cars, speed))
-    # No check of what varies over devices: a car that starts at rest sideways has constants among its states.
+    # No check of the variation over devices: a car that starts without lateral motion has constants among its states.
     split = jax.jit(jax.shard_map(run, mesh=mesh, in_specs=parts, out_specs=P(None, "runs"), check_vma=False))
     given = jax.device_put((cars, speed), jax.tree.map(lambda part: NamedSharding(mesh, part), parts))
     whole = jax.jit(run)

@@ -1,4 +1,4 @@
-"""MF-Tyre 6.1 in combined slip, forces and moments of many contacts, and the gradient with respect to everything."""
+"""MF-Tyre 6.1 in combined slip: forces and moments of many contacts, and the gradient with respect to all inputs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OURS, LIMIT, VALUE, GRADIENT, PLAIN = "jaxveh", "C++ limit", "value", "value and
 
 
 def cases(smoke: bool) -> list[Case]:
-    """Forces and moments in both precisions; the gradient in reverse mode, in blocks and plain."""
+    """Return the cases: forces and moments in both precisions; the gradient in reverse mode, in blocks and plain."""
     count = 50 if smoke else 100_000
     made = []
     for dtype in ("float64", "float32"):
@@ -38,7 +38,7 @@ def cases(smoke: bool) -> list[Case]:
                 bounds=(Bound(OURS, (LIMIT,), 2.0),) if dtype == "float64" else (),
             )
         )
-    # A gradient compiles for ten seconds: to see that it runs, one is enough.
+    # A gradient compiles for ten seconds: one is enough to show that it runs.
     for dtype in ("float64",) if smoke else ("float64", "float32"):
         made.append(
             Case(
@@ -54,7 +54,7 @@ def cases(smoke: bool) -> list[Case]:
 
 
 def tyre(dtype: np.typing.DTypeLike, coefficients: Mapping[str, float] = COEFFICIENTS) -> mf_tyre.MFTyre:
-    """The tyre of these coefficients, as a property file of them would give it."""
+    """Return the tyre with these coefficients, as from a property file."""
     sections = (
         mf_tyre.Structure,
         mf_tyre.LongitudinalCoefficients,
@@ -75,7 +75,7 @@ def _coefficients(section: type, given: Mapping[str, float]) -> dict[str, float]
 
 
 def contact(given: Contacts) -> tyres.Contact:
-    """The contacts as the library takes them."""
+    """Return the contacts in the library's form."""
     return tyres.Contact(**{name: jnp.asarray(array) for name, array in given._asdict().items()})
 
 
@@ -101,12 +101,12 @@ def _build(dtype: np.dtype, count: int) -> Sequence[Contestant | Skipped]:
 
 
 def weighted_sum(tyre: mf_tyre.MFTyre, contact: tyres.Contact, weights: Sequence[jax.Array]) -> jax.Array:
-    """All forces and moments, weighted at random, in one number: its gradient pulls every output back."""
+    """Return all forces and moments, randomly weighted, as one number, whose gradient involves every output."""
     return jnp.sum(_weighted(tyre, (contact, weights)))
 
 
 def weighted_sum_in_blocks(tyre: mf_tyre.MFTyre, contact: tyres.Contact, weights: Sequence[jax.Array]) -> jax.Array:
-    """The same number; its gradient is made block by block."""
+    """Return the same number; its gradient is computed block by block."""
     return numerics.sum_in_blocks(_weighted, tyre, (contact, weights))
 
 

@@ -1,4 +1,4 @@
-"""Unscented Kalman filter of three states, one run and many."""
+"""Unscented Kalman filter of three states, for one run and many."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ MOST = {
     ("float64", 1000): 2.5,
     ("float32", 1000): 3,
 }
-"""Times of the limit, which keeps no row either."""
+"""Bounds over the time of the limit, which does not keep rows either."""
 
 
 def cases(smoke: bool) -> list[Case]:
-    """One run, 64 and 1000 at once."""
+    """Return the cases: one run, and 64 and 1000 at once."""
     made = []
     for dtype in ("float64", "float32"):
         for runs in (1, 3) if smoke else (1, 64, 1000):
@@ -105,7 +105,7 @@ def _ours(problem: SpeedAndMass, dtype: np.dtype, work: float, name: str = OURS)
 
 
 def _jitted(name: str, run: Callable, problem: SpeedAndMass, dtype: np.dtype, work: float) -> Contestant:
-    """A jitted function of the measured speeds, (rows,) for one run and (runs, rows) for many."""
+    """Return a contestant from a jitted function of the measured speeds, (rows,) for one run and (runs, rows) for many."""
     with ours.precision(dtype):
         speed = jnp.asarray(problem.speed[:, 0] if problem.runs == 1 else problem.speed.T, dtype)
 

@@ -69,7 +69,7 @@ __all__ = [
     "vehicles",
 ]
 
-# Rooms are imported when first asked for: all of them take as long as jax itself.
+# Subpackages are imported when they are first used: importing all of them takes as long as importing jax.
 _INSIDE = {"Estimate": "statespace", "cast": "statespace", "run": "statespace", "simulate": "simulation"}
 _ROOMS = tuple(name for name in __all__ if name not in _INSIDE and name not in globals())
 

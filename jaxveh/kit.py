@@ -1,6 +1,6 @@
-"""What those who add to any room build with: parameters that say their unit and range, records, checks and their errors.
+"""Tools for extensions of any subpackage: parameters with unit and range, records, checks and their errors.
 
-A room's own `kit` has what is the room's (`filters.kit`, `estimators.kit`, ...).
+The `kit` of a subpackage has the tools for that subpackage (`filters.kit`, `estimators.kit`, ...).
 """
 
 from jaxveh._core.bijectors import AbstractBijector, Interval, Positive, Real

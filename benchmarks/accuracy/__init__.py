@@ -1,1 +1,1 @@
-"""How well sideslip is estimated, on real logs and on a fleet of simulated cars."""
+"""The accuracy of sideslip estimates, on real logs and on a fleet of simulated cars."""

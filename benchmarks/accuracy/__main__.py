@@ -1,8 +1,8 @@
 """`python -m benchmarks.accuracy [--only TEXT] [--no-fleet | --no-logs] [--runs N] [--seed N] [--json FILE]`.
 
-Sideslip on every shared log in every setting, and on a fleet of simulated cars, next to the open-loop linear model and to the
-car's file at its word. Every estimate is blind but those "with v_y", whose calibration span has the reference. Nothing below
-3 m/s is scored (0.5 for cars under a metre).
+Estimates sideslip on every shared log in every setting, and on a fleet of simulated cars, next to the open-loop linear model and
+to the values of the car file. Every estimate is blind except those "with v_y", whose calibration span has the reference. Rows
+below 3 m/s are not scored (0.5 for cars shorter than a metre).
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from pathlib import Path
 from .. import machine
 
 FORGET = 20
-"""Logs of the fleet after which compiled programs are forgotten: each length has its own, and a process can hold so many."""
+"""Number of fleet logs after which compiled programs are dropped: each length has its own, and their number is limited."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure and report; returns the exit code (2 for bad arguments)."""
+    """Measure and report; return the exit code (2 for bad arguments)."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy", description=__doc__)
     parser.add_argument("--only", default="", help="part of a line's log and setting, e.g. Genesis or blind")
     parser.add_argument("--no-fleet", action="store_true", help="the shared logs alone")

@@ -1,4 +1,4 @@
-"""Nine ways in which a log goes wrong, each made of a sound one."""
+"""Nine faults of a log, each added to a sound log."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from jaxveh import Recording
 
 BEGIN = 0.4
-"""The share of the log after which something happens to it."""
+"""The share of the log after which the fault begins."""
 
 
 def _at(log: Recording) -> int:
@@ -27,7 +27,7 @@ def _changed(log: Recording, name: str, change) -> Recording:
 
 
 def spike(log: Recording) -> Recording:
-    """The accelerometer and the gyroscope each say something absurd, once every 7 s, for one row."""
+    """The accelerometer and the gyroscope each have an absurd value for one row, once every 7 s."""
 
     def a_y(values):
         values[_at(log) :: _rows(log, 7.0)] = 90.0
@@ -39,7 +39,7 @@ def spike(log: Recording) -> Recording:
 
 
 def stuck(log: Recording) -> Recording:
-    """The accelerometer says the same for 6 s."""
+    """The accelerometer repeats one value for 6 s."""
 
     def hold(values):
         first = _at(log)
@@ -67,12 +67,12 @@ def gap(log: Recording) -> Recording:
 
 
 def kilometres(log: Recording) -> Recording:
-    """The speed is in km/h, and nobody says so."""
+    """The speed is in km/h, without a unit."""
     return log.replace(v_x=3.6 * np.asarray(log["v_x"]))
 
 
 def degrees(log: Recording) -> Recording:
-    """The yaw rate is in deg/s, and nobody says so."""
+    """The yaw rate is in deg/s, without a unit."""
     return log.replace(yaw_rate=np.degrees(np.asarray(log["yaw_rate"])))
 
 
@@ -87,7 +87,7 @@ def a_y_sign(log: Recording) -> Recording:
 
 
 def delay(log: Recording) -> Recording:
-    """The lateral acceleration comes 200 ms late."""
+    """The lateral acceleration is 200 ms late."""
 
     def late(values):
         count = _rows(log, 0.2)
@@ -100,4 +100,4 @@ FAULTS = {
     "spike": spike, "stuck": stuck, "jump": jump, "gap": gap, "km/h": kilometres, "degrees": degrees, "sign of steer": steer_sign,
     "sign of a_y": a_y_sign, "delay": delay,
 }  # fmt: skip
-"""By name."""
+"""The faults by name."""

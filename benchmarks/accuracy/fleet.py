@@ -1,7 +1,7 @@
-"""A fleet of simulated cars: the whole car on winding roads, with the sensors of production cars and car files that are wrong.
+"""A fleet of simulated cars: full cars on winding roads, with the sensors of production cars and car files with errors.
 
-The truth is the car of fourteen degrees of freedom on MF-Tyres. Nothing of it but the laws of mechanics is shared with what
-estimates: that is a single track on its own tyre law, which neither rolls nor pitches and knows no road.
+The truth is the car of fourteen degrees of freedom on MF-Tyres. It shares only the laws of mechanics with the estimator, which is
+a single track with its own tyre law, without roll, pitch and road.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from jaxveh import Recording, io, manoeuvres, numerics, roads, sensors, simulate
 from .logs import Log
 
 DT = 0.01
-"""s: rows of the logs."""
+"""Step between rows of the logs, s."""
 
 MAX_STEP = 0.002
-"""s: of the simulation; shorter than what wheel hop and spins at these speeds ask for."""
+"""Largest step of the simulation, s; shorter than wheel hop and spins at these speeds need."""
 
 LATEST = 5
-"""Rows by which the steering channel comes later than the inertial unit's, or earlier, at most."""
+"""Largest delay, or lead, of the steering channel relative to the inertial unit, rows."""
 
 
 class Drive(NamedTuple):
-    """A way of driving: the mean `speed` (m/s) on dry road, and the share of the tyres' grip that the sharpest corners take."""
+    """A way of driving: the mean `speed` (m/s) on dry road, and the share of the tyres' `grip` that the sharpest corners need."""
 
     speed: float
     grip: float
@@ -43,26 +43,27 @@ DRIVES = {
 }
 
 SPREADS = {"mass": 0.15, "yaw_inertia": 0.2, "cg": 0.1}
-"""Relative standard deviations of what a car's file says, about the truth; `cg`: of the distance to the front axle."""
+"""Relative standard deviations of the values in a car file about the truth; `cg`: of the distance to the front axle."""
 
 STIFFNESS = (0.6, 1.6)
-"""What a car's file says of an axle's cornering stiffness over the truth: even on the logarithm between these."""
+"""Range of an axle's cornering stiffness in the car file over the truth, uniform on the logarithm."""
 
 ROUGHNESS = (8e-6, 256e-6)
-"""m^3: the roads' unevenness is even on the logarithm between these: half of ISO 8608's class A, to class C."""
+"""Range of the roads' unevenness, m^3, uniform on the logarithm: half of ISO 8608's class A, to class C."""
 
 SHORTEST_WAVE, WAVES = 1.0, 40
-"""m: of the unevenness, and how many waves make it; shorter ones shake wheels and tell an accelerometer nothing below 15 Hz."""
+"""Shortest wavelength of the unevenness, m, and number of waves; shorter ones shake the wheels, but have no effect on an
+accelerometer below 15 Hz."""
 
 BIASES = {"a_y": 0.3, "a_x": 0.3, "yaw_rate": np.radians(0.3), "steer": np.radians(0.5), "v_x": 0.005}
 """Standard deviations of constant sensor errors: m/s^2, rad/s, rad at the road wheels; of the speed's gain."""
 
 
 LOST = np.radians(30.0)
-"""Of sideslip: the car is lost, and its log ends a second before; shorter than `LEAST` there is none."""
+"""Sideslip above which the car is lost, rad; its log ends a second before, and is dropped if shorter than `LEAST`."""
 
 LEAST = 30.0
-"""s."""
+"""Shortest log, s."""
 
 
 class WindingRoad(manoeuvres.AbstractGraph):
@@ -78,7 +79,7 @@ class WindingRoad(manoeuvres.AbstractGraph):
     def y(self, x):
         k = 2 * jnp.pi * self.wavenumbers
         turns = k * jnp.asarray(x)[..., None] + self.phases
-        # y'' of each harmonic has the standard deviation `curvature` / sqrt(n); the road leaves the origin along x.
+        # y'' of each harmonic has the standard deviation `curvature` / sqrt(n); the road starts at the origin along x.
         size = self.curvature * jnp.sqrt(2.0 / self.wavenumbers.size) / k**2
         wave = (
             numerics.sin(turns) - numerics.sin(self.phases) - k * jnp.asarray(x)[..., None] * numerics.cos(self.phases)
@@ -87,7 +88,7 @@ class WindingRoad(manoeuvres.AbstractGraph):
 
 
 class Run(NamedTuple):
-    """One run's numbers, or those of many side by side: the car, its road, its driver, its sensors' constant errors, a key."""
+    """The numbers of one run, or of many in a batch: the car, its road, its driver, its sensors' constant errors, a key."""
 
     car: Any
     road: Any
@@ -97,7 +98,7 @@ class Run(NamedTuple):
 
 
 class FleetLog(NamedTuple):
-    """A `Log` of the fleet, and what nobody is told: the car's name, its drive, the road's friction, bank and roughness (m^3)."""
+    """A `Log` of the fleet, and hidden values: the car's name, its drive, the road's friction, bank and roughness (m^3)."""
 
     log: Log
     car: str
@@ -108,7 +109,7 @@ class FleetLog(NamedTuple):
 
 
 def cars() -> dict[str, vehicles.CarNumbers]:
-    """The parameter sets that have a suspension, on tyres of one law."""
+    """Return the parameter sets that have a suspension, on tyres of one law."""
     made = {name: make() for name, make in vehicles.sets.CARS.items()}
     plain = lambda tyre: dataclasses.replace(tyre, coefficients=None)
     return {
@@ -119,9 +120,9 @@ def cars() -> dict[str, vehicles.CarNumbers]:
 
 
 def fleet(runs: int, seed: int = 0, duration: float = 90.0) -> list[FleetLog]:
-    """Logs of up to `runs` drives of `duration` s, every car and every drive in turn; simulated by one program.
+    """Return logs of up to `runs` drives of `duration` s, with every car and every drive in turn, simulated by one program.
 
-    A drive ends where its car is `LOST` or stands, and is left out where that is sooner than `LEAST`.
+    A drive ends when its car is `LOST` or stands, and is left out if that is sooner than `LEAST`.
     """
     rng, numbers = np.random.default_rng(seed), cars()
     names, drives = list(numbers), list(DRIVES)
@@ -140,7 +141,7 @@ def fleet(runs: int, seed: int = 0, duration: float = 90.0) -> list[FleetLog]:
         kept = _until_lost(recording)
         if kept is None:
             continue
-        # The reference is the truth where the file says that the centre of gravity is.
+        # The reference is the truth at the centre of gravity of the car file.
         name = f"fleet {i}: {car}, {drive}"
         shape = run.road.grade
         banked = bool(shape.bank.std > 1e-6)
@@ -156,7 +157,7 @@ def _until_lost(recording: Recording) -> Recording | None:
 
 
 class Told(NamedTuple):
-    """A car's file, by how much (m) its centre of gravity is ahead of the true one, and how rough its road is (m^3)."""
+    """A car file, the distance (m) of its centre of gravity ahead of the true one, and the roughness of its road (m^3)."""
 
     file: io.CarSpecification
     cg_error: float
@@ -175,7 +176,7 @@ def _draw(numbers: vehicles.CarNumbers, drive: Drive, rng: np.random.Generator, 
     grip = friction * min(numbers.front.friction, numbers.rear.friction)
     mean = drive.speed * np.sqrt(min(grip, 1.0)) * rng.uniform(0.85, 1.15)
     wanted = manoeuvres.wavering_speed(mean, 0.1 * mean, speed, time=15.0)
-    # The sharpest of a sum of many harmonics is about two and a half times its standard deviation.
+    # The largest curvature of a sum of many harmonics is about two and a half times its standard deviation.
     curvature = drive.grip * grip * vehicles.GRAVITY / mean**2 / 2.5
     path = WindingRoad(curvature, *numerics.band_harmonics(way, 1.0 / 400.0, 1.0 / 60.0, 40))
     driver = manoeuvres.SpeedControl(
@@ -206,7 +207,7 @@ POSES = ("roll", "pitch", "roll_rate", "pitch_rate", "roll_acceleration", "pitch
 @eqx.filter_jit
 @eqx.filter_vmap
 def _simulate(run: Run) -> tuple[dict, dict]:
-    """What the sensors say, and the truth."""
+    """Return the measurements and the truth."""
     drive = simulate(run.car, run.driver, road=run.road, dt=DT, max_step=MAX_STEP, solver="explicit", throw=False)
     truth = {name: drive[f"true.{name}"] for name in (*SEEN, *POSES)}
     said = {}
@@ -233,6 +234,6 @@ def _devices(biases: dict) -> tuple:
 
 
 def _late(channels: dict[str, np.ndarray], rows: int) -> dict[str, np.ndarray]:
-    """The steer comes `rows` rows later than all else, or earlier where negative."""
+    """Delay the steer by `rows` rows relative to all other channels; negative values make it early."""
     at = np.clip(np.arange(len(channels["steer"])) - rows, 0, len(channels["steer"]) - 1)
     return channels | {"steer": channels["steer"][at]}

@@ -1,4 +1,4 @@
-"""Real logs with a reference, and what of each is calibrated on and what is estimated."""
+"""Real logs with a reference, and the parts of each for calibration and for estimation."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ LOGS = {
     "AV-21": ("av21_putnam_25hz.csv", "av21.toml"),
     "F1TENTH": ("f1tenth_100hz.csv", "f1tenth.toml"),
 }
-"""By name: the log, and the file of its car, in the folder of the shared data."""
+"""The logs by name: the log and its car file, in the folder of the shared data."""
 
 ELSEWHERE = {"AV-21 at its reference's point": ("AV-21", (0.69, 0.0, 0.0))}
-"""The same logs with another `reference_position` (m) than their car's file says: the AV-21's v_y is that of a point 1.94 m ahead
+"""The same logs with another `reference_position` (m) than in their car file: the AV-21's v_y is that of a point 1.94 m ahead
 of a rear axle that hardly slips (least squares of v_y / v_x on yaw_rate / v_x), 0.69 m ahead of the file's centre of gravity."""
 
 REFERENCE = "v_y"
-"""The channel that no estimate sees, but for the settings with it."""
+"""The reference channel, hidden from every estimate except in the settings that use it."""
 
 
 class Log(NamedTuple):
-    """A log with its reference, and the car's file."""
+    """A log with its reference, and the car file."""
 
     name: str
     car: io.CarSpecification
@@ -37,8 +37,11 @@ class Log(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """`calibrate`: start and end of the calibration (s), None for the car's file at its word; `estimate`: of what is scored;
-    `uses`: the references that the calibration sees."""
+    """The spans of an estimate.
+
+    `calibrate`: start and end of the calibration (s), None for the values of the car file; `estimate`: those of the scored part;
+    `uses`: the references of the calibration.
+    """
 
     name: str
     calibrate: tuple[float, float] | None
@@ -47,12 +50,12 @@ class Setting(NamedTuple):
 
 
 def folder() -> Path:
-    """Where the shared data are: `JAXVEH_SHARED`, or `shared` beside the project."""
+    """Return the folder of the shared data: `JAXVEH_SHARED`, or `shared` beside the project."""
     return Path(os.environ.get("JAXVEH_SHARED", Path(__file__).resolve().parents[3] / "shared")) / "data"
 
 
 def read(name: str) -> Log:
-    """A log of `LOGS`, or of `ELSEWHERE`."""
+    """Read a log of `LOGS` or of `ELSEWHERE`."""
     if name in ELSEWHERE:
         same, place = ELSEWHERE[name]
         log = read(same)
@@ -62,8 +65,11 @@ def read(name: str) -> Log:
 
 
 def settings(log: Log) -> Iterator[Setting]:
-    """What is done with a log: each half from the other, the rest from the first 60 and 30 s, the whole from itself without its
-    reference, and the car's file at its word; what is calibrated on a part also with the reference of that part."""
+    """Yield the settings of a log.
+
+    They are: each half calibrated on the other, the rest on the first 60 and 30 s, the whole on itself without its reference, and
+    the values of the car file; a calibration on a part is also done with the reference of that part.
+    """
     time = np.asarray(log.recording.time)
     start, end = float(time[0]), float(time[-1])
     middle = 0.5 * (start + end)

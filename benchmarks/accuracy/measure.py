@@ -1,4 +1,4 @@
-"""One line of the table: a setting of a log estimated, and scored beside what is simpler."""
+"""One line of the table: the score of a log's setting, beside simpler estimates."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ AS_TOLD = Setting("as told", None, (-np.inf, np.inf))
 
 @dataclass(frozen=True)
 class Line:
-    """What became of a setting. Angles in degrees; `failed`: why there is no estimate.
+    """The result of a setting. Angles in degrees; `failed`: why there is no estimate.
 
-    `over_open_loop`, `over_as_told`: the error over that of the open-loop linear model, and over that of the estimate from the
-    car's file at its word, on the same rows; `..._without_constant`: of errors without their constant part.
+    `over_open_loop`, `over_as_told`: the error over that of the open-loop linear model, and over that of the estimate with the
+    values of the car file, on the same rows; `..._without_constant`: of errors without their constant part.
     """
 
     log: str
@@ -40,7 +40,7 @@ class Line:
 
     @property
     def over_open_loop(self) -> float:
-        """The error over the open loop's."""
+        """The error over that of the open loop."""
         return self.rmse / self.open_loop
 
     @property
@@ -50,17 +50,17 @@ class Line:
 
     @property
     def over_as_told(self) -> float:
-        """The error over that of the car's file at its word."""
+        """The error over that with the values of the car file."""
         return self.rmse / self.as_told
 
     def numbers(self) -> dict:
-        """All of it by name, for JSON."""
+        """Return all numbers by name, for JSON."""
         ratios = ("over_open_loop", "over_open_loop_without_constant", "over_as_told")
         return asdict(self) | {name: getattr(self, name) for name in ratios}
 
 
 def measure(log: Log, setting: Setting) -> Line:
-    """Calibrate and estimate as the setting says, and score."""
+    """Calibrate and estimate in a setting, and score."""
     begun = time.perf_counter()
     part = log.recording.between(*_open_ended(setting.estimate))
     blind = part.without(REFERENCE)
@@ -98,5 +98,5 @@ def _score(log: Log, part, estimate) -> dict:
 
 
 def _open_ended(span: tuple[float, float]) -> tuple[float, float]:
-    """A span whose last row counts."""
+    """Return the span with its last row included."""
     return span[0], float(np.nextafter(span[1], np.inf))

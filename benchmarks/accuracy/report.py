@@ -1,4 +1,4 @@
-"""The table, and what of all lines together matters."""
+"""The table, and the summary of all lines."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _cells(line: Line) -> list[str]:
 
 
 def summary(lines: Sequence[Line]) -> dict[str, float]:
-    """Of many lines of one setting: quantiles of the error over the open loop's, shares, and coverage."""
+    """Summarise many lines of one setting: quantiles of the error over that of the open loop, shares, and coverage."""
     done = [line for line in lines if not line.failed]
     if not done:
         return {"runs": len(lines), "failed": len(lines)}
@@ -81,17 +81,17 @@ AT_MOST = {
     "Ferrari, forward": ("rmse", 0.24),
     "Ferrari, reversed": ("rmse", 0.33),
 }
-"""Of a log's lines, or of one setting of it: a ratio to the open loop, or an error in degrees."""
+"""Bounds for a log's lines, or for one setting of it: a ratio to the open loop, or an error in degrees."""
 
 COVERAGE = (0.88, 0.99)
-"""Of 95 % bands, of logs that estimate without having seen their reference."""
+"""Allowed coverage of 95 % bands, for logs that are estimated without their reference."""
 
 SHARE = 1.02
-"""Of the error of what is simpler, the open loop and the car's file at its word."""
+"""Bound of the error over that of simpler estimates, the open loop and the values of the car file."""
 
 
 def criteria(lines: Sequence[Line]) -> list[str]:
-    """What was asked of each blind line of a log, in words: whether it holds, the value and the bound."""
+    """Return the criteria of each blind line of a log in words: whether it holds, the value and the bound."""
     found = []
     for line in lines:
         if line.failed or REFERENCE in line.setting:
@@ -107,7 +107,7 @@ def criteria(lines: Sequence[Line]) -> list[str]:
 
 
 def fleet_criteria(about: dict[str, float]) -> list[str]:
-    """The same of a fleet's summary."""
+    """Return the criteria of a fleet's summary in words."""
     if "over_open_loop_median" not in about:
         return []
     asked = (

@@ -1,7 +1,7 @@
-"""A hand-vectorised C++ measuring stick: what one core can do, for comparison with the library.
+"""A hand-vectorised C++ implementation: the limit of one core, for comparison with the library.
 
-It solves exactly the problems of ``benchmarks.problems`` and returns what a user would want (means and log-likelihood),
-so that its answers can be checked as well as its time.
+It solves exactly the problems of ``benchmarks.problems`` and returns the results that a user needs (means and log-likelihood),
+so that its results can be checked as well as its time.
 """
 
 from __future__ import annotations
@@ -114,10 +114,10 @@ def particle_filter(
     dtype: np.typing.DTypeLike = np.float64,
     extra_flags: tuple[str, ...] = (),
 ) -> Callable[[int], ParticleResult]:
-    """A bootstrap or auxiliary particle filter, ready to run: a function of the seed.
+    """Return a bootstrap or auxiliary particle filter, ready to run, as a function of the seed.
 
-    Systematic resampling before every step; the auxiliary filter looks ahead with the state propagated without noise. The
-    first row weighs draws from the prior. The array of means is overwritten by the next call.
+    It uses systematic resampling before every step; the auxiliary filter looks ahead with the state propagated without noise.
+    The first row weights draws from the prior. The array of means is overwritten by the next call.
     """
     if particles < 2:
         raise ValueError(f"particles is {particles}; at least 2 are needed")
@@ -154,7 +154,7 @@ def particle_filter(
 def unscented(
     problem: SpeedAndMass, *, dtype: np.typing.DTypeLike = np.float64, extra_flags: tuple[str, ...] = ()
 ) -> Callable[[], UnscentedResult]:
-    """The unscented filter of all runs, ready to run. The result's arrays are overwritten by the next call."""
+    """Return the unscented filter of all runs, ready to run. The result's arrays are overwritten by the next call."""
     single = _is_single(dtype)
     function = library(extra_flags).jaxveh_unscented
     function.restype = None
@@ -187,7 +187,7 @@ def unscented(
 def mf_tyre(
     contacts: Contacts, *, dtype: np.typing.DTypeLike = np.float64, extra_flags: tuple[str, ...] = ()
 ) -> Callable[[], TyreForces]:
-    """MF-Tyre 6.1 with `COEFFICIENTS` at all contacts, ready to run. The result's arrays are overwritten by the next call."""
+    """Return MF-Tyre 6.1 with `COEFFICIENTS` at all contacts, ready to run. The next call overwrites the result's arrays."""
     single = _is_single(dtype)
     compiled = library(extra_flags)
     compiled.jaxveh_mf_tyre_names.restype = ctypes.c_char_p
@@ -200,7 +200,7 @@ def mf_tyre(
     pointers = [(ctypes.c_void_p * len(arrays))(*[a.ctypes.data for a in arrays]) for arrays in (given, found)]
 
     def run() -> TyreForces:
-        assert given  # the pointers lead into these arrays, so they live as long
+        assert given  # the pointers point into these arrays, which must live as long
         function(single, len(given[0]), _pointer(coefficients), *pointers)
         return found
 
@@ -210,9 +210,9 @@ def mf_tyre(
 def seven_dof(
     problem: Drives, *, dtype: np.typing.DTypeLike = np.float64, extra_flags: tuple[str, ...] = ()
 ) -> Callable[[], np.ndarray]:
-    """All drives, ready to run: states (8, rows, runs) at the end of each row. The array is overwritten by the next call.
+    """Return all drives, ready to run: states (8, rows, runs) at the end of each row. The next call overwrites the array.
 
-    One run is computed in plain scalars, in float64 alone.
+    One run is computed in plain scalars, and only in float64.
     """
     single = _is_single(dtype)
     p = problem

@@ -1,4 +1,4 @@
-"""Builds the C++ limit with one ``g++`` command into a cache folder and loads it."""
+"""Build and load of the C++ limit, with one ``g++`` command and a cache folder."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class LimitUnavailable(RuntimeError):
 
 
 def unavailable() -> str | None:
-    """Why the limit cannot be built on this machine, or None when it can be."""
+    """Return why the limit cannot be built on this machine; None if it can."""
     if shutil.which("g++") is None:
         return "g++ is not on the PATH; install it (Debian: apt install g++) to compare with the C++ limit"
     if platform.machine().lower() not in ("x86_64", "amd64"):
@@ -54,7 +54,7 @@ def unavailable() -> str | None:
 
 
 def build(extra_flags: tuple[str, ...] = ()) -> Path:
-    """The shared library, compiled unless the cache holds it already.
+    """Return the path of the shared library, compiled unless it is in the cache already.
 
     The cache key covers the sources, the flags, the compiler and the processor (``-march=native`` code may not run
     elsewhere). Set ``XDG_CACHE_HOME`` to move the cache.
@@ -89,7 +89,7 @@ def build(extra_flags: tuple[str, ...] = ()) -> Path:
 
 @functools.cache
 def library(extra_flags: tuple[str, ...] = ()) -> ctypes.CDLL:
-    """The loaded library; it is built when first asked for."""
+    """Return the loaded library; it is built when it is first used."""
     return ctypes.CDLL(str(build(extra_flags)))
 
 

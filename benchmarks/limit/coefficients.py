@@ -51,7 +51,7 @@ FITS = (
 
 
 def power_series(fit: Fit, terms: int) -> np.ndarray:
-    """Coefficients of 1, x, x^2, ... that interpolate ``fit.function`` in ``terms`` Chebyshev points of its interval.
+    """Return coefficients of 1, x, x^2, ... that interpolate ``fit.function`` in ``terms`` Chebyshev points of its interval.
 
     The interpolation runs in extended precision, because the change from Chebyshev to power basis amplifies rounding.
     """
@@ -72,7 +72,7 @@ def power_series(fit: Fit, terms: int) -> np.ndarray:
 
 
 def header() -> str:
-    """The text of ``coefficients.hpp``."""
+    """Return the text of ``coefficients.hpp``."""
     lines = ["// Written by coefficients.py when the library is built.", "#pragma once", "namespace coefficients {"]
     for fit in FITS:
         for suffix, terms in (("single", fit.single), ("double", fit.double)):

@@ -1,1 +1,1 @@
-"""Mutations at random: does a test fail when one operator, sign, constant or argument of the physics is wrong?"""
+"""Random mutations: whether a test fails if one operator, sign, constant or argument of the physics is wrong."""

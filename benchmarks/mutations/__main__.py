@@ -1,9 +1,10 @@
 """`python -m benchmarks.mutations [--count 200] [--seed 0] [--minutes 60] [--workers N] [--only PATH] [--tests PATH]
 [--own]`.
 
-Changes one expression of filters, vehicles, tyres or sensors at random, in a copy, and runs the test files that execute its
-line until one fails. Prints what survived and the share that was killed. Results are kept, so that the same call goes on
-where it was ended; the files' coverage is measured first, once. Both hold for these sources alone, whose tests must pass.
+Changes one random expression of filters, vehicles, tyres or sensors, in a copy, and runs the test files that execute its line
+until one fails. Prints the surviving mutations and the share of killed ones. Results are kept, so that the same call continues
+after an interruption; the coverage of the files is measured first, once. Both hold only for these sources, whose tests must
+pass.
 """
 
 from __future__ import annotations
@@ -43,14 +44,14 @@ COPIED = (
 EXIT_NO_TESTS = 5
 
 SLOWER = 4.0
-"""How many times as long as it took a test file may take before a mutation counts as noticed."""
+"""A mutation counts as noticed if a test file takes this many times its usual time."""
 
 LONGEST = 3600.0
-"""Seconds that a test file may take under coverage."""
+"""Longest time of a test file under coverage, s."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Mutate and report; the exit code is 0 where all mutations that could be judged were killed, else 1."""
+    """Mutate and report; the exit code is 0 if all judged mutations were killed, otherwise 1."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mutations", description=__doc__)
     parser.add_argument("--count", type=int, default=200, help="mutations in all (default 200)")
     parser.add_argument("--seed", type=int, default=0, help="of their choice (default 0)")
@@ -71,7 +72,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     options.kept.mkdir(parents=True, exist_ok=True)
     (options.kept / ".gitignore").write_text("*\n")
-    # What was found of other sources says nothing of these.
+    # Results for other sources do not apply to these.
     options.kept = options.kept / digest()
     options.kept.mkdir(exist_ok=True)
     end = time.monotonic() + 60.0 * options.minutes
@@ -87,13 +88,13 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def digest() -> str:
-    """A name of the package and its tests as they are."""
+    """Return a name for the present sources of the package and its tests."""
     paths = [path for folder in ("jaxveh", "tests") for path in sorted((ROOT / folder).rglob("*.py"))]
     return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()[:12]
 
 
 def environment(root: Path, kept: Path) -> dict[str, str]:
-    """Tests of the package in `root`, with programs kept: most are those of the package as it is."""
+    """Return the environment for tests of the package in `root`, with kept programs: most are those of the unchanged package."""
     shared = os.environ.get("JAXVEH_SHARED", str(ROOT.parent / "shared"))
     more = {
         "PYTHONPATH": str(root),
@@ -106,8 +107,10 @@ def environment(root: Path, kept: Path) -> dict[str, str]:
 
 
 def draw(count: int, seed: int, only: str = "") -> list[Mutation]:
-    """Mutations at random, each line as likely as another and at most one a line; of swapped arguments, which mostly fail at
-    once, no more than one in ten."""
+    """Draw random mutations, at most one per line, with equal probability for all lines.
+
+    At most one in ten swaps arguments, because these mostly fail at once.
+    """
     paths = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
     names = [str(path.relative_to(ROOT)) for path in paths]
     found = [m for name in names if only in name for m in mutations(name, (ROOT / name).read_text())]
@@ -129,7 +132,7 @@ def _one_a_line(rng: random.Random, found: list[Mutation], count: int) -> list[M
 
 
 def judge(chosen: list[Mutation], measurements: dict, options, end: float) -> dict[str, str]:
-    """The verdict on each mutation by its name; those that are known already are not run again."""
+    """Return the verdict on each mutation by its name; mutations with a known verdict are not run again."""
     log = options.kept / "verdicts.jsonl"
     known = dict(json.loads(line) for line in log.read_text().splitlines()) if log.exists() else {}
     lock, copies = threading.Lock(), threading.local()
@@ -153,7 +156,7 @@ def judge(chosen: list[Mutation], measurements: dict, options, end: float) -> di
 
 
 def copied(root: Path) -> Path:
-    """A copy of what tests need."""
+    """Make a copy of the files that tests need."""
     root.mkdir()
     for name in COPIED:
         source = ROOT / name
@@ -166,8 +169,10 @@ def copied(root: Path) -> Path:
 
 
 def tried(mutation: Mutation, measurements: dict, root: Path, options) -> str:
-    """`killed`, `survived`, `time-out` (a test file `SLOWER` times as slow as it was: as good as killed) or `not covered`, of one
-    mutation in a copy."""
+    """Return the verdict on one mutation in a copy: `killed`, `survived`, `time-out` or `not covered`.
+
+    A `time-out`, a test file that is `SLOWER` times as slow as before, counts as killed.
+    """
     path = root / mutation.file
     source = path.read_text()
     files = choose(measurements, mutation.file, lines_beside(source, mutation.line), options.own)
@@ -185,7 +190,7 @@ def tried(mutation: Mutation, measurements: dict, root: Path, options) -> str:
 
 
 def passes(root: Path, file: str, options, limit: float) -> str:
-    """What one test file says of a copy: `survived`, `killed` or `time-out`."""
+    """Return the result of one test file for a copy: `survived`, `killed` or `time-out`."""
     command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-p", "no:cacheprovider", file]
     process = subprocess.Popen(
         command, cwd=root, env=environment(root, options.kept), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -201,7 +206,7 @@ def passes(root: Path, file: str, options, limit: float) -> str:
 
 
 def report(chosen: list[Mutation], verdicts: dict[str, str], file: Path) -> int:
-    """Prints and writes what came out; 1 where something survived."""
+    """Print and write the results; return 1 if a mutation survived."""
     judged = [(m, verdicts[m.name]) for m in chosen if m.name in verdicts]
     survivors = [(m, verdict) for m, verdict in judged if verdict in ("survived", "not covered")]
     for mutation, verdict in survivors:

@@ -1,4 +1,4 @@
-"""Which test files execute which lines: each file's own coverage, measured once and kept."""
+"""The lines that each test file executes: its coverage, measured once and kept."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ FOLDERS = (
     "fitting",
     "observers",
 )
-"""Rooms of tests that are measured."""
+"""Folders of tests that are measured."""
 
 
 def test_files(root: Path) -> list[str]:
-    """The test files of the rooms, from the root."""
+    """Return the test files of these folders, relative to the root."""
     return sorted(
         str(path.relative_to(root)) for folder in FOLDERS for path in (root / "tests" / folder).glob("test_*.py")
     )
 
 
 def measured(root: Path, kept: Path, file: str, environment: dict[str, str], limit: float) -> dict:
-    """What a test file executes: `seconds`, and `lines` by file of the package; from `kept` where it has been measured.
+    """Return `seconds` of a test file, and the `lines` that it executes by file of the package; from `kept` if measured before.
 
-    In a process of its own: what another file has traced already would not be executed again. A file whose tests fail as it is
-    can say nothing of a mutation: it ends the program.
+    It runs in a separate process, because functions that another file has traced would not be executed again. A file whose tests
+    fail without a mutation cannot judge one: it ends the program.
     """
     found = kept / (file.replace("/", "__") + ".json")
     if found.exists():
@@ -69,8 +69,10 @@ def measured(root: Path, kept: Path, file: str, environment: dict[str, str], lim
 
 
 def choose(measurements: dict[str, dict], file: str, lines: set[int], own: bool = False) -> list[str]:
-    """The test files that execute one of the lines: those of its own room first, of these the numbers on record, then the quick
-    ones. `own`: no others."""
+    """Return the test files that execute one of the lines: first those of its own folder, recorded numbers and quick ones first.
+
+    `own`: only those of its own folder.
+    """
     room = Path(file).parts[1]
     hit = [name for name, about in measurements.items() if lines & set(about["lines"].get(file, ()))]
     recorded = lambda name: Path(name).name.startswith("test_recorded")
@@ -82,8 +84,11 @@ def choose(measurements: dict[str, dict], file: str, lines: set[int], own: bool 
 
 
 def lines_beside(source: str, line: int) -> set[int]:
-    """The lines whose execution tells that of `line`: its statement's; for one that runs on import, those of all functions of
-    the module, since every test file runs it and few look at it."""
+    """Return the lines whose execution shows that of `line`: those of its statement.
+
+    For a line that runs on import they are those of all functions of the module, because every test file runs it, but few test
+    it.
+    """
     tree = ast.parse(source)
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
     bodies = {i for node in functions for i in range(node.body[0].lineno, (node.end_lineno or 0) + 1)}

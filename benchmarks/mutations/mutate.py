@@ -1,4 +1,4 @@
-"""Changes of one expression within one line of Python: what a slip of the pen would make of it."""
+"""Changes of one expression within one line of Python, like those of a typing error."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ SWAPS = "swapped arguments"
 
 
 class Mutation(NamedTuple):
-    """`before` in columns `start` to `end` of `line` (from 1) of a file becomes `after`; `kind` in words."""
+    """A mutation: `before` in columns `start` to `end` of `line` (from 1) of a file becomes `after`; `kind` in words."""
 
     file: str
     line: int
@@ -52,11 +52,11 @@ class Mutation(NamedTuple):
 
     @property
     def name(self) -> str:
-        """One name for one change."""
+        """A unique name of the change."""
         return f"{self.file}:{self.line}:{self.start}-{self.end}:{self.kind}:{self.after}"
 
     def applied(self, source: str) -> str:
-        """The file's text with the change."""
+        """Return the file's text with the change."""
         lines = source.split("\n")
         # Columns of the syntax tree count bytes.
         text = lines[self.line - 1].encode()
@@ -64,7 +64,7 @@ class Mutation(NamedTuple):
         return "\n".join(lines)
 
     def diff(self, source: str) -> str:
-        """The change as a unified diff without context."""
+        """Return the change as a unified diff without context."""
         found = difflib.unified_diff(
             source.splitlines(), self.applied(source).splitlines(), self.file, self.file, lineterm="", n=0
         )
@@ -72,7 +72,7 @@ class Mutation(NamedTuple):
 
 
 def mutations(file: str, source: str) -> list[Mutation]:
-    """All mutations of a file, in the order of its text; none of words, checks of input, annotations and declarations."""
+    """Return all mutations of a file in the order of its text, except those of texts, checks, annotations and declarations."""
     found = []
     for node in _computing(ast.parse(source)):
         if node.lineno == node.end_lineno:
@@ -81,7 +81,7 @@ def mutations(file: str, source: str) -> list[Mutation]:
 
 
 def _computing(node: ast.AST) -> Iterator[ast.expr]:
-    """The expressions that compute something."""
+    """Yield the expressions that compute something."""
     if isinstance(node, ast.Raise | ast.Assert | ast.Import | ast.ImportFrom | ast.JoinedStr):
         return
     if isinstance(node, ast.FunctionDef) and _only_checks(node.name):
@@ -150,19 +150,19 @@ def _of(file: str, source: str, node: ast.expr) -> Iterator[Mutation]:
 
 
 def _end(node: ast.expr) -> int:
-    """Behind the expression, which stands in one line."""
+    """Return the column after the expression, which is within one line."""
     assert node.end_col_offset is not None
     return node.end_col_offset
 
 
 def _between(change, line: bytes, left: ast.expr, right: ast.expr, sign: str, other: str, kind: str) -> Mutation:
-    """The operator's sign, which stands somewhere between its operands, parentheses beside it."""
+    """Return the mutation of the operator's sign, which is between its operands, with parentheses beside it."""
     start = line.find(sign.encode(), left.end_col_offset, right.col_offset)
     return change(start, start + len(sign), other, kind)
 
 
 def _words(node: ast.BinOp) -> bool:
-    """Whether text or types are joined, which is no arithmetic."""
+    """Whether texts or types are joined, which is not arithmetic."""
     parts = [part for side in (node.left, node.right) for part in ast.walk(side)]
     text = any(
         isinstance(p, ast.JoinedStr) or (isinstance(p, ast.Constant) and isinstance(p.value, str)) for p in parts

@@ -1,1 +1,1 @@
-"""The same work done with NumPy and with other libraries: one module a contestant."""
+"""The same work done with NumPy and with other libraries: one module per contestant."""

@@ -1,7 +1,7 @@
 """The Gaussian, ensemble and particle filters of `cuthbert`, jitted; its Gaussian filters are square-root filters.
 
-The library's first state comes before any measurement. The problems measure it, so the first measurement is applied with the
-library's own update before its scan begins.
+In the library the first state has no measurement. In the problems it has one, which is applied with the library's own update
+before its scan begins.
 """
 
 from __future__ import annotations
@@ -145,8 +145,10 @@ def ensemble(plain: Plain, dtype: np.typing.DTypeLike, members: int) -> Callable
 def particle_filter(
     problem: SingleTrack, count: int, *, auxiliary: bool = False, dtype: np.typing.DTypeLike
 ) -> Callable:
-    """The bootstrap filter, resampled before every step, as a function of the key, and of measurements (rows, 2) if not the
-    problem's: weighted means (rows, 11) and log-likelihood. There is no auxiliary one."""
+    """The bootstrap filter, resampled before every step, as a function of the key: weighted means (rows, 11), log-likelihood.
+
+    Measurements (rows, 2) may replace those of the problem. There is no auxiliary filter.
+    """
     if auxiliary:
         raise ValueError("cuthbert has no auxiliary particle filter")
     p = problem
@@ -184,13 +186,15 @@ def guided(plain: Plain, dtype: np.typing.DTypeLike, count: int) -> Callable:
 
 
 def backward_sampling(plain: Plain, dtype: np.typing.DTypeLike, count: int, paths: int) -> Callable:
-    """The bootstrap filter and paths drawn backwards through its particles, a function of measurements and keys: means and
-    spreads of the paths (rows, n) and the filter's log-likelihood."""
+    """The bootstrap filter and paths drawn backwards through its particles, a function of measurements and keys.
+
+    It returns means and standard deviations of the paths (rows, n), and the filter's log-likelihood.
+    """
     functions, inputs = particle_functions(plain, dtype), jnp.asarray(plain.inputs, dtype)
     move = lambda key, x, given: functions.move(key, x, given[0])
     weigh = lambda before, x, given: functions.log_likelihood(given[1], x, given[0])
     filter_ = smc.build_filter(functions.start, move, weigh, count, systematic.resampling)
-    # The likelihood of the later state does not tell the earlier ones apart, so that the transition is enough.
+    # The likelihood of the later state is the same for all earlier ones, so that the transition density is enough.
     density = lambda before, x, given: functions.log_transition(x, before, given[0])
     smoother = backward_sampler.build_smoother(density, exact_sampling.simulate, multinomial.resampling, paths)
 
@@ -205,7 +209,7 @@ def backward_sampling(plain: Plain, dtype: np.typing.DTypeLike, count: int, path
 
 
 def _particles(filter_: Any, first: Callable, inputs: jax.Array, y: jax.Array, key: jax.Array) -> Any:
-    """The states of every row; `first(None, x, (inputs, y))` weighs the first row's particles."""
+    """Return the states of every row; `first(None, x, (inputs, y))` weights the particles of the first row."""
     begin, rest = jax.random.split(key)
     state = filter_.init_prepare(key=begin)
     logs = jax.vmap(first, (None, 0, None))(None, state.particles, (inputs[0], y[0]))
@@ -220,7 +224,7 @@ def _weighted(states: Any) -> tuple[jax.Array, jax.Array]:
 
 
 def _arrays(plain: Plain, dtype: np.typing.DTypeLike) -> list[jax.Array]:
-    """Mean, factors of the prior's, of the process's and of the measurements' covariance, and the inputs."""
+    """Return the mean, the factors of the covariances of prior, process and measurements, and the inputs."""
     factors = [np.linalg.cholesky(P) for P in (plain.covariance, plain.process, plain.noise)]
     return [jnp.asarray(a, dtype) for a in (plain.mean, *factors, plain.inputs)]
 

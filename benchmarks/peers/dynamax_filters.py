@@ -50,7 +50,7 @@ FIELDS = ["filtered_means", "filtered_covariances"]
 
 
 def unscented(problem: SpeedAndMass, dtype: np.typing.DTypeLike) -> Callable:
-    """A jitted function of the measured speeds (rows,) of one run or (runs, rows): means and log-likelihood."""
+    """Return a jitted function of the measured speeds (rows,) of one run or (runs, rows): means and log-likelihood."""
     transition, observation = speed_functions(problem)
     arrays = gaussian_arrays(problem, dtype)
     params = ParamsNLGSSM(
@@ -95,8 +95,10 @@ def extended(plain: Plain, dtype: np.typing.DTypeLike) -> Callable:
 
 
 def iterated(plain: Plain, dtype: np.typing.DTypeLike, linearisations: int = 5) -> Callable:
-    """The iterated filter: as much work as it should do, but each pass uses the measurement anew, with the last's result
-    as the prior, so that it says too little spread."""
+    """The iterated filter, with the right amount of work, but too small standard deviations.
+
+    Each pass uses the measurement again, with the result of the previous pass as the prior.
+    """
     params, inputs = _nonlinear(plain, dtype), jnp.asarray(plain.inputs, dtype)
     run = lambda y: extended_kalman_filter(params, y, inputs, linearisations, output_fields=FIELDS)
     return over_runs(lambda y: filtered(run(y)))
@@ -128,7 +130,7 @@ def cubature(plain: Plain, dtype: np.typing.DTypeLike) -> Callable:
 
 
 def gauss_hermite(plain: Plain, dtype: np.typing.DTypeLike) -> Callable:
-    """The Gauss-Hermite filter with three points an axis."""
+    """The Gauss-Hermite filter with three points per axis."""
     return _by_integrals(plain, dtype, GHKFIntegrals(3))
 
 
@@ -180,12 +182,12 @@ def _nonlinear(plain: Plain, dtype: np.typing.DTypeLike) -> Any:
 
 
 def filtered(done: Any) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Means, spreads and log-likelihood of a filter's posterior."""
+    """Return means, standard deviations and log-likelihood of a filter's posterior."""
     return done.filtered_means, _std(done.filtered_covariances), done.marginal_loglik
 
 
 def smoothed(done: Any) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Means, spreads and log-likelihood of a smoother's posterior."""
+    """Return means, standard deviations and log-likelihood of a smoother's posterior."""
     return done.smoothed_means, _std(done.smoothed_covariances), done.marginal_loglik
 
 

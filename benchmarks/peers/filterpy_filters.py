@@ -85,8 +85,10 @@ def kalman(plain: Plain) -> Callable[[np.ndarray], Arrays]:
 
 
 def kalman_smoother(plain: Plain) -> Callable[[np.ndarray], Arrays]:
-    """Its Rauch-Tung-Striebel smoother, which takes no inputs: it is given the motion that they leave, exactly the same
-    work, whose means are not the problem's."""
+    """Its Rauch-Tung-Striebel smoother, which has no inputs: it smooths the motion without them.
+
+    The work is exactly the same, but the means are not those of the problem.
+    """
 
     def run(y: np.ndarray) -> Arrays:
         kf, means, covariances, total = _kalman_loop(plain, y)
@@ -118,8 +120,10 @@ def _kalman_filter(plain: Plain) -> KalmanFilter:
 
 
 def interacting(plain: Plain, levels: tuple[float, ...], stay: float) -> Callable[[np.ndarray], Arrays]:
-    """Interacting multiple models: Kalman filters whose process noise has these levels of standard deviation; each stays with
-    this probability, and else is any other."""
+    """Interacting multiple models: Kalman filters whose process noise has these levels of standard deviation.
+
+    A mode stays with probability `stay`, and otherwise changes to any other with equal probability.
+    """
     n, D, modes = len(plain.mean), plain.matrices[3], len(levels)
     change = np.full((modes, modes), (1 - stay) / (modes - 1))
     np.fill_diagonal(change, stay)
@@ -133,7 +137,7 @@ def interacting(plain: Plain, levels: tuple[float, ...], stay: float) -> Callabl
         for k, u in enumerate(plain.inputs):
             if k:
                 imm.predict(u[:, None])
-            before = imm.cbar  # in the first row the modes' probabilities: they start equal
+            before = imm.cbar  # in the first row the modes' probabilities, which start equal
             imm.update((y[k] - D @ u)[:, None])
             means[k], covariances[k] = imm.x[:, 0], imm.P
             total += math.log(before @ imm.likelihood)
@@ -143,8 +147,11 @@ def interacting(plain: Plain, levels: tuple[float, ...], stay: float) -> Callabl
 
 
 def h_infinity(plain: Plain, bound: float, weights: list[float]) -> Callable[[np.ndarray], Arrays]:
-    """The H-infinity filter. The library warns of it: its prediction moves no covariance, and its update moves the state that
-    the prediction has moved. With F = 1 and no process noise the update is right, and the loop does the prediction."""
+    """The H-infinity filter, about which the library itself warns.
+
+    Its prediction does not propagate the covariance, and its update propagates the predicted state again. With F = 1 and no
+    process noise the update is right, and the loop does the prediction.
+    """
     F, B, H, D = plain.matrices
     n, m = H.shape[1], H.shape[0]
 
@@ -166,14 +173,16 @@ def h_infinity(plain: Plain, bound: float, weights: list[float]) -> Callable[[np
 
 
 def fixed_lag(plain: Plain, lag: int) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
-    """Means (rows, n) of the fixed-lag smoother, and those of the filter in it. The former are not the smoother's: its gains
-    are made of the covariance after the measurement, where that before it belongs."""
+    """Means (rows, n) of the fixed-lag smoother, and those of the filter in it.
+
+    The former are not those of a correct smoother: its gains use the covariance after the measurement instead of that before it.
+    """
     F, B, H, D = plain.matrices
 
     def run(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         found = FixedLagSmoother(H.shape[1], H.shape[0])
         found.F, found.B, found.H, found.Q, found.R = F, B, H, plain.process, plain.noise
-        # It predicts before the first measurement, too: this leads to the prior.
+        # It also predicts before the first measurement: this start is predicted to the prior.
         back = np.linalg.inv(F)
         found.x = back @ (plain.mean - B @ plain.inputs[0])[:, None]
         found.P = back @ (plain.covariance - plain.process) @ back.T
@@ -184,7 +193,7 @@ def fixed_lag(plain: Plain, lag: int) -> Callable[[np.ndarray], tuple[np.ndarray
 
 
 def square_root(plain: Plain) -> Callable[[np.ndarray], Arrays]:
-    """The square-root Kalman filter, which knows no log-likelihood."""
+    """The square-root Kalman filter, which has no log-likelihood."""
     F, B, H, D = plain.matrices
     n, m = H.shape[1], H.shape[0]
 
@@ -204,14 +213,14 @@ def square_root(plain: Plain) -> Callable[[np.ndarray], Arrays]:
 
 
 class _Extended(ExtendedKalmanFilter):
-    """Moves the mean by a function, as the library asks one to override."""
+    """Propagates the mean by a function, in the method that the library asks users to override."""
 
     def predict_x(self, u: Any = 0) -> None:
         self.x = self.move(self.x, u)
 
 
 def extended(plain: Plain) -> Callable[[np.ndarray], Arrays]:
-    """The extended Kalman filter, with slopes by central differences: the library leaves them to the user."""
+    """The extended Kalman filter, with Jacobians by central differences: the library leaves them to the user."""
     n, m = len(plain.mean), len(plain.noise)
     reach = 1e-4 * np.sqrt(np.diag(plain.covariance))
 
@@ -263,7 +272,7 @@ def unscented_filter(plain: Plain) -> Callable[[np.ndarray], Arrays]:
 
 
 def cubature(plain: Plain, *, regenerate: bool = False) -> Callable[[np.ndarray], Arrays]:
-    """The cubature filter. Its update keeps the points of before the process noise; ``regenerate`` draws them anew."""
+    """The cubature filter. Its update keeps the points from before the process noise; ``regenerate`` makes new ones."""
     n, m = len(plain.mean), len(plain.noise)
 
     def run(y: np.ndarray) -> Arrays:

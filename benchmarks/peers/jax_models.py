@@ -1,4 +1,4 @@
-"""The problems as functions of plain arrays in `jax.numpy`, as the other JAX libraries want them."""
+"""The problems as functions of plain arrays in `jax.numpy`, the form for other JAX libraries."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["TrackFunctions", "gaussian_arrays", "over_runs", "single_track_funct
 
 
 def speed_functions(problem: SpeedAndMass) -> tuple[Callable, Callable]:
-    """Transition (3,), (1,) -> (3,) with the torque of the step's start as input, and observation -> (1,)."""
+    """Return the transition (3,), (1,) -> (3,), with the torque at the step's start as input, and the observation -> (1,)."""
     p = problem
 
     def transition(x: jax.Array, u: jax.Array) -> jax.Array:
@@ -41,12 +41,12 @@ def speed_functions(problem: SpeedAndMass) -> tuple[Callable, Callable]:
 
 
 def over_runs(one: Callable) -> Callable:
-    """A jitted function of the measurements (rows, m) of one run, or of many (runs, rows, m)."""
+    """Return a jitted function of the measurements (rows, m) of one run, or of many (runs, rows, m)."""
     return jax.jit(lambda measured, *rest: (one if measured.ndim == 2 else jax.vmap(one))(measured, *rest))
 
 
 def gaussian_arrays(problem: SpeedAndMass, dtype: np.typing.DTypeLike) -> dict[str, jax.Array]:
-    """Mean, covariances and the torque that leads into each row, as arrays of ``dtype``."""
+    """Return mean, covariances and the torque of the step into each row, as arrays of ``dtype``."""
     p = problem
     into = np.concatenate([p.torque[:1], p.torque[:-1]])[:, None]
     return {
@@ -68,7 +68,7 @@ class TrackFunctions(NamedTuple):
 
 
 def single_track_functions(problem: SingleTrack) -> TrackFunctions:
-    """The eleven-state problem as functions of one particle (11,)."""
+    """Return the eleven-state problem as functions of one particle (11,)."""
     p = problem
 
     def magic_formula(slip, D, C, B, E):

@@ -1,4 +1,4 @@
-"""Vectorised NumPy filters: what one writes without a library, and the reference for the limit's answers."""
+"""Vectorised NumPy filters, as one would write them without a library, and the reference for the results of the limit."""
 
 from __future__ import annotations
 

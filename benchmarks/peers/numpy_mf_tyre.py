@@ -1,4 +1,4 @@
-"""MF-Tyre 6.1 in NumPy: the formula as an engineer writes it out of the book, over arrays of contacts."""
+"""MF-Tyre 6.1 in NumPy: the equations as an engineer would copy them from the book, over arrays of contacts."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _weight(x, shift, B, C, E):
 
 
 def forces(coefficients: Mapping[str, float], contacts: Contacts) -> tuple[np.ndarray, ...]:
-    """F_x, F_y (N), M_x, M_y, M_z (N m), in the contacts' type and in the library's signs; limits on."""
+    """Return F_x, F_y (N), M_x, M_y, M_z (N m), in the contacts' type and with the library's signs; limits are applied."""
     c = of_type(contacts.load.dtype, coefficients)
     at = operating(c, contacts)
     F_x, K_xk = _longitudinal(c, at)
@@ -43,12 +43,12 @@ def forces(coefficients: Mapping[str, float], contacts: Contacts) -> tuple[np.nd
 
 
 def slip_forces(c: types.SimpleNamespace, at: types.SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
-    """F_x and F_y (N) alone, of coefficients `of_type` at points `operating`."""
+    """Return only F_x and F_y (N), for coefficients from `of_type` at points from `operating`."""
     return _longitudinal(c, at)[0], _lateral(c, at)[0]
 
 
 def of_type(dtype: np.dtype, coefficients: Mapping[str, float]) -> types.SimpleNamespace:
-    """The coefficients as numbers of a type."""
+    """Return the coefficients as numbers of a type."""
     return types.SimpleNamespace(**{name: dtype.type(value) for name, value in coefficients.items()})
 
 
@@ -68,7 +68,7 @@ def _lateral(c, at):
 
 
 def operating(c: types.SimpleNamespace, contacts: Contacts) -> types.SimpleNamespace:
-    """Contacts within the tyre's ranges, and what all equations look at; no slip coefficient is in it."""
+    """Return contacts within the tyre's ranges, and quantities that all equations use; these include no slip coefficient."""
     speed, alpha = abs(contacts.speed), -contacts.slip_angle
     share = np.minimum(speed / c.VXLOW, 1)
     alpha = np.clip(alpha * np.minimum(speed * (1 + abs(tan(alpha))) / c.VXLOW, 1), c.ALPMIN, c.ALPMAX)
@@ -158,7 +158,7 @@ def _overturning(c, at, F_y):
 
 
 def _rolling(c, at, F_x, contacts):
-    # Load and slip ratio as they are given, not within the ranges.
+    # Load and slip ratio as given, not limited to the ranges.
     load, slip_ratio = np.maximum(contacts.load, 0), contacts.slip_ratio
     load = np.where(load < c.FZMIN, load**2 / c.FZMIN, load)
     share, speed = load / c.FNOMIN, at.speed / c.LONGVL
@@ -173,5 +173,5 @@ def _rolling(c, at, F_x, contacts):
 
 
 def _kind_of(like, value):
-    """A number in the type of an array, so that float32 stays float32."""
+    """Return a number in the type of an array, so that float32 stays float32."""
     return like.dtype.type(value)

@@ -63,7 +63,7 @@ class _Bootstrap(particles.FeynmanKac):
 class _Auxiliary(_Bootstrap):
     """Looks ahead with the state propagated without noise, which is computed once.
 
-    The library resamples the array of particles, so the propagated states and their look-ahead travel as further columns.
+    The library resamples the array of particles, so the propagated states and their look-ahead are further columns of it.
     """
 
     def M0(self, N: int) -> np.ndarray:
@@ -74,7 +74,7 @@ class _Auxiliary(_Bootstrap):
         return self._ahead(xp[:, 11:22] + p.process_std * self.rng.standard_normal((len(xp), 11)), t)
 
     def logG(self, t: int, xp: np.ndarray, x: np.ndarray) -> np.ndarray:
-        return self.problem.log_likelihood(x[:, :11].T, t)  # the library takes the look-ahead off itself
+        return self.problem.log_likelihood(x[:, :11].T, t)  # the library itself subtracts the look-ahead
 
     def logeta(self, t: int, x: np.ndarray) -> np.ndarray:
         return x[:, 22]
@@ -88,7 +88,7 @@ class _Auxiliary(_Bootstrap):
 
 
 class _Always:
-    """Mixed in first: resample before every step."""
+    """The first base class: resampling before every step."""
 
     def time_to_resample(self, smc: particles.SMC) -> bool:
         return True
@@ -189,8 +189,10 @@ def guided(plain: Plain, count: int) -> Callable[[np.ndarray, int], Result]:
 def backward_sampling(
     plain: Plain, count: int, paths: int
 ) -> Callable[[np.ndarray, int], tuple[np.ndarray, np.ndarray, float]]:
-    """The bootstrap filter of a linear problem and paths drawn backwards through its particles, a function of measurements and
-    seed: means and spreads of the paths (rows, n) and the filter's log-likelihood."""
+    """The bootstrap filter of a linear problem and paths drawn backwards through its particles.
+
+    A function of measurements and seed: means and standard deviations of the paths (rows, n), and the filter's log-likelihood.
+    """
 
     def run(y: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
         smc = _run(_Linear(plain, y, seed), count, seed, store_history=True)

@@ -19,8 +19,11 @@ LOG_2PI = float(np.log(2 * np.pi))
 
 
 class ParticleFunctions(NamedTuple):
-    """``start(key)`` draws of the prior (n,), ``move(key, x, u)`` of the transition; ``log_transition(new, x, u)`` and
-    ``log_likelihood(y, x, u)`` are densities. ``u`` is the row of inputs that ``new`` and ``y`` belong to."""
+    """A problem as functions of one particle.
+
+    ``start(key)`` draws from the prior (n,), ``move(key, x, u)`` from the transition; ``log_transition(new, x, u)`` and
+    ``log_likelihood(y, x, u)`` are log-densities. ``u`` is the row of inputs of ``new`` and ``y``.
+    """
 
     start: Callable
     move: Callable
@@ -29,7 +32,7 @@ class ParticleFunctions(NamedTuple):
 
 
 def particle_functions(plain: Plain, dtype: np.typing.DTypeLike) -> ParticleFunctions:
-    """Noises are independent: covariances are diagonal."""
+    """Return the functions of a problem with independent noises, whose covariances are diagonal."""
     mean, spread, noise, error = _arrays(plain, dtype)
     draw = lambda key: jax.random.normal(key, mean.shape, dtype)
     return ParticleFunctions(
@@ -48,9 +51,9 @@ class Guide(NamedTuple):
 
 
 def guide(plain: Plain, dtype: np.typing.DTypeLike) -> Guide:
-    """A Kalman update of each particle's process noise, linearised where the transition takes it.
+    """Return a Kalman update of each particle's process noise, linearised at the state after the transition.
 
-    Of a linear problem it is the optimal proposal, and gain and factor are the same for all: they are computed beforehand.
+    For a linear problem it is the optimal proposal, and gain and factor are the same for all particles: they are precomputed.
     """
     _, _, noise, error = _arrays(plain, dtype)
     Q, R = jnp.diag(noise**2), jnp.diag(error**2)
@@ -81,7 +84,7 @@ def guide(plain: Plain, dtype: np.typing.DTypeLike) -> Guide:
 
 
 def over_keys(one: Callable) -> Callable:
-    """A jitted function of measurements (rows, m) and a key, or of (runs, rows, m) and a key a run."""
+    """Return a jitted function of measurements (rows, m) and a key, or of (runs, rows, m) and one key per run."""
     return jax.jit(lambda y, key: (one if y.ndim == 2 else jax.vmap(one))(y, key))
 
 
@@ -90,6 +93,6 @@ def _log_normal(white: jax.Array, scales: jax.Array) -> jax.Array:
 
 
 def _arrays(plain: Plain, dtype: np.typing.DTypeLike) -> list[jax.Array]:
-    """The prior's mean and standard deviations, those of the process and of the measurements."""
+    """Return the prior's mean and standard deviations, and those of process and measurements."""
     spreads = [np.sqrt(np.diag(P)) for P in (plain.covariance, plain.process, plain.noise)]
     return [jnp.asarray(a, dtype) for a in (plain.mean, *spreads)]

@@ -37,7 +37,7 @@ def kalman(plain: Plain, dtype: np.typing.DTypeLike) -> Callable:
 
 
 def kalman_smoother(plain: Plain, dtype: np.typing.DTypeLike) -> Callable:
-    """The Rauch-Tung-Striebel smoother; what inputs do is in the forward pass's predictions, which it is handed."""
+    """The Rauch-Tung-Striebel smoother; the effect of inputs is in the predictions of the forward pass, which it receives."""
     run, F = _linear(plain, dtype), jnp.asarray(plain.matrices[0], dtype)
 
     def one(y: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
@@ -114,7 +114,7 @@ def _std(covariances: jax.Array) -> jax.Array:
 
 
 def unscented(problem: SpeedAndMass, dtype: np.typing.DTypeLike) -> Callable:
-    """A jitted function of the measured speeds (rows,) of one run or (runs, rows): means and log-likelihood."""
+    """Return a jitted function of the measured speeds (rows,) of one run or (runs, rows): means and log-likelihood."""
     transition, observation = speed_functions(problem)
     arrays = gaussian_arrays(problem, dtype)
 
@@ -139,10 +139,9 @@ def unscented(problem: SpeedAndMass, dtype: np.typing.DTypeLike) -> Callable:
 
 
 def particle_filter(problem: SingleTrack, count: int, *, auxiliary: bool, dtype: np.typing.DTypeLike) -> Callable:
-    """A jitted function of the key, and of measurements (rows, 2) if not the problem's: weighted means (rows, 11) and
-    log-likelihood.
+    """Return a jitted function of the key: weighted means (rows, 11) and log-likelihood.
 
-    Input row t holds what the step into t was driven with, and what the measurement at t sees.
+    Measurements (rows, 2) may replace those of the problem. Input row t has the inputs of the step into t and of its measurement.
     """
     p = problem
     move, _, log_likelihood = single_track_functions(p)
@@ -199,10 +198,10 @@ def guided(plain: Plain, dtype: np.typing.DTypeLike, count: int) -> Callable:
 
 
 def liu_west(plain: Plain, dtype: np.typing.DTypeLike, count: int, shrinkage: float, states: int) -> Callable:
-    """The filter of Liu and West: the first `states` of the problem's states move, with noise, the others are parameters.
+    """The filter of Liu and West: the first `states` of the problem's states move with noise, the others are parameters.
 
-    A function of measurements and keys: means (rows, n) in the problem's order and log-likelihood. The look-ahead is the
-    likelihood of the state that moved without noise.
+    It is a function of measurements and keys: means (rows, n) in the problem's order and log-likelihood. The look-ahead is the
+    likelihood of the state that is propagated without noise.
     """
     mean, covariance, process, *_, inputs = _arrays(plain, dtype)
     spread, noise = jnp.sqrt(jnp.diag(covariance)), jnp.sqrt(jnp.diag(process))[:states]

@@ -1,1 +1,1 @@
-"""What every room shares: recordings, names, chosen parameters, bijectors, result codes, errors."""
+"""The base of all subpackages: recordings, names, chosen parameters, bijectors, result codes, errors."""

@@ -17,15 +17,15 @@ class AbstractBijector(eqx.Module):
 
     @abc.abstractmethod
     def forward(self, unconstrained) -> Any:
-        """The physical value; same shape."""
+        """Return the physical value; same shape."""
 
     @abc.abstractmethod
     def inverse(self, physical) -> Any:
-        """The unconstrained value; same shape. Raises `InputError` where a concrete value lies outside the domain."""
+        """Return the unconstrained value; same shape. Raises `InputError` if a concrete value lies outside the domain."""
 
     @abc.abstractmethod
     def slope(self, physical) -> Any:
-        """d physical / d unconstrained at a physical value: turns standard deviations from one to the other."""
+        """Return d physical / d unconstrained at a physical value, which converts standard deviations."""
 
 
 class Real(AbstractBijector):
@@ -63,7 +63,7 @@ class Interval(AbstractBijector):
 
     def __check_init__(self):
         if (is_concrete(self.low, self.high) and not np.isfinite(self.high - self.low)) or self.low >= self.high:
-            raise InputError(f"Interval({self.low}, {self.high}): low must be below high, both finite.")
+            raise InputError(f"Interval({self.low}, {self.high}): low must be less than high, and both finite.")
 
     def forward(self, unconstrained):
         return self.low + (self.high - self.low) / (1 + jnp.exp(-unconstrained))

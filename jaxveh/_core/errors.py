@@ -1,4 +1,4 @@
-"""Errors that name the thing, the value and the allowed range, and say what to do next."""
+"""Errors that name the thing, the value, the allowed range and the remedy."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 
 class InputError(ValueError):
-    """Something given to jaxveh is wrong and can be put right by whoever gave it (the programs exit with code 2)."""
+    """An input of jaxveh is wrong, and the caller can correct it (the programs exit with code 2)."""
 
 
 class FilterError(RuntimeError):
@@ -24,7 +24,7 @@ class JaxvehWarning(UserWarning):
 
 
 def is_concrete(*values) -> bool:
-    """Whether none of the values is a tracer, so that it may be looked at (checks skip tracers)."""
+    """Whether none of the values is a tracer, so that they can be checked (checks skip tracers)."""
     return not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(values))
 
 
@@ -42,22 +42,22 @@ def check(name: str, value, holds, allowed: str, advice: str = "") -> None:
 
 
 def check_positive(name: str, value, unit: str = "", advice: str = "") -> None:
-    """Raise unless every element of `value` is finite and above zero."""
+    """Raise `InputError` unless every element of `value` is finite and above zero."""
     check(name, value, lambda v: np.isfinite(v) & (v > 0), f"positive and finite{f' ({unit})' if unit else ''}", advice)
 
 
 def check_finite(name: str, value, advice: str = "") -> None:
-    """Raise unless every element of `value` is finite."""
+    """Raise `InputError` unless every element of `value` is finite."""
     check(name, value, np.isfinite, "finite", advice)
 
 
 def check_at_least(name: str, value, least, advice: str = "") -> None:
-    """Raise unless every element of `value` is at least `least`."""
+    """Raise `InputError` unless every element of `value` is at least `least`."""
     check(name, value, lambda v: v >= least, f"at least {least}", advice)
 
 
 def check_whole(name: str, value, least: int = 1, advice: str = "") -> None:
-    """Raise unless `value` is a whole number of at least `least`: a Python or NumPy integer, no float and no truth value."""
+    """Raise `InputError` unless `value` is a Python or NumPy integer of at least `least`; floats and truth values are refused."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
     if not whole or value < least:
         raise InputError(
@@ -66,7 +66,7 @@ def check_whole(name: str, value, least: int = 1, advice: str = "") -> None:
 
 
 def check_one_of(name: str, value, allowed) -> None:
-    """Raise unless `value` is one of `allowed`; the message proposes the one that looks most like it."""
+    """Raise `InputError` unless `value` is one of `allowed`; the message suggests the most similar one."""
     if value not in tuple(allowed):
         raise InputError(
             f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}.{did_you_mean([value], allowed)}"
@@ -74,11 +74,11 @@ def check_one_of(name: str, value, allowed) -> None:
 
 
 WHEELS = {"front_left": "fl", "front_right": "fr", "rear_left": "rl", "rear_right": "rr"}
-"""How wheels are called elsewhere, and here."""
+"""Common names of the wheels, and the short names of this package."""
 
 
 def near(name: str, names: Iterable[str]) -> list[str]:
-    """The names that look like `name`, nearest first; case does not count, and wheels may have their whole names."""
+    """Return the names that are similar to `name`, the nearest first; case is ignored, and wheels may have their long names."""
     names = list(names)
     for whole, short in WHEELS.items():
         if name.casefold().endswith(whole) and name[: -len(whole)] + short in names:
@@ -91,26 +91,26 @@ def near(name: str, names: Iterable[str]) -> list[str]:
 
 
 def did_you_mean(unknown: Iterable[Any], names: Iterable[Any]) -> str:
-    """A question, " Did you mean a, b?", of the names that look most like the unknown ones; nothing where none does."""
+    """Return the question " Did you mean a, b?" with the names most similar to the unknown ones; "" if there are none."""
     names = [name for name in names if isinstance(name, str)]
     found = [close[0] for one in unknown if isinstance(one, str) and (close := near(one, names))]
     return f" Did you mean {', '.join(dict.fromkeys(found))}?" if found else ""
 
 
 def check_key(who: str, key: Any) -> None:
-    """Raise unless `key` is a key of `jax.random`, of the new kind or the old."""
+    """Raise `InputError` unless `key` is a key of `jax.random`, of the new or the old kind."""
     dtype = getattr(key, "dtype", None)
     if dtype is None or not (jax.numpy.issubdtype(dtype, jax.dtypes.prng_key) or dtype == np.uint32):
         raise InputError(f"{who}: key = {key!r}: must be a key of jax.random, e.g. key=jax.random.key(0).")
 
 
 def float_array(value) -> Any:
-    """A strong float array of the default precision unless the value carries a float dtype of its own.
+    """Convert to a strong float array, of the default precision unless the value has its own float dtype.
 
-    A Python float or a weak type would be a new compilation; see `equinox.field(converter=...)`.
+    A Python float or a weak type would cause a new compilation; see `equinox.field(converter=...)`.
     """
     if type(value) is float:
-        # NumPy converts it in two thirds of the time: a tyre has hundreds.
+        # NumPy converts it in two thirds of the time, and a tyre has hundreds of them.
         with np.errstate(over="ignore"):
             return jax.numpy.asarray(np.asarray(value, jax.dtypes.canonicalize_dtype(float)))
     if isinstance(value, (jax.Array, np.ndarray, np.generic)) and np.issubdtype(value.dtype, np.floating):

@@ -1,4 +1,4 @@
-"""What all estimates along a log have in common when they are shown and kept."""
+"""Display and storage of all estimates along a log."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from jaxveh._core.result import Result
 from jaxveh._core.shown import Kept, above
 
 ENDINGS = {"mean": "", "std": "_std", "known": "_known"}
-"""How variables of these fields end, behind a quantity's name: as the columns of `io.to_frame`."""
+"""Endings of the variables of these fields after a quantity's name, as in the columns of `io.to_frame`."""
 
 
 class Estimated(Kept):
     """An estimate with `time`, and `mean` and `std` by name.
 
-    A class says in `by_row` which fields have a value an instant, in `by_run` which have one a run, and in `records` the classes
-    of NamedTuples by name. Fields that are in neither are not kept: None when they come back.
+    A class lists in `by_row` the fields with a value per instant, in `by_run` those with a value per run, and in `records` the
+    classes of NamedTuples by name. Fields in neither list are not stored: they are None when the estimate is read back.
     """
 
     __slots__ = ()
@@ -35,13 +35,16 @@ class Estimated(Kept):
     records: ClassVar[dict[str, Any]] = {}
 
     def to_pandas(self) -> Any:
-        """A `pandas.DataFrame` with a column `time`, each quantity's mean as `name`, beside it `name_std`, and one more where
-        a method says so; units in `frame.attrs["units"]`. A batch has a column `run` as well."""
+        """Return a `pandas.DataFrame` with a column `time`, and for each quantity its mean `name` and `name_std`.
+
+        A method that reports whether a quantity is known adds a column for that. Units are in `frame.attrs["units"]`. A batch
+        also has a column `run`.
+        """
         self._need("mean")
         return super().to_pandas()
 
     def plot(self, *arguments: Any, **options: Any) -> Any:
-        """A panel a quantity with its bands, and a truth where one is given; see `plots.estimate`. **Returns** the figure."""
+        """Draw a panel per quantity with its bands, and a truth if given; see `plots.estimate`. **Returns** the figure."""
         self._need("mean", "std")
         return super().plot(*arguments, **options)
 
@@ -80,7 +83,7 @@ class Estimated(Kept):
         return make_again(cls, {**fields, TIME: time_again(labelled)})
 
     def _lead(self) -> int:
-        """Dimensions of the batch: what a value a row, or a run, has beside."""
+        """Return the number of dimensions of the batch: those of a value in addition to that of rows."""
         rows = [np.ndim(leaf) - 1 for name in self.by_row for leaf in jax.tree.leaves(getattr(self, name))]
         runs = [np.ndim(leaf) for name in self.by_run for leaf in jax.tree.leaves(getattr(self, name))]
         return min([*rows, *runs], default=np.ndim(getattr(self, TIME)) - 1)
@@ -108,7 +111,7 @@ class Estimated(Kept):
         return getattr(self, "mean", None), getattr(self, "std", None), getattr(self, "known", None)
 
     def _ended(self) -> str:
-        """How it went, in words."""
+        """Return the outcome in words."""
         result = getattr(self, "result", None)
         if result is None or not is_known(result):
             return ""
@@ -124,7 +127,7 @@ def _unit(name: str) -> str:
 
 
 def _usual(std: Any) -> str:
-    """The median of what is finite."""
+    """Return the median of the finite values."""
     if std is None or not is_known(std):
         return "-"
     values = np.asarray(std, np.float64)
@@ -137,5 +140,5 @@ def _share(known: Any) -> str:
 
 
 def with_prefix(labelled: Labelled, prefix: str) -> dict[str, Variable]:
-    """The variables of a result that is part of another."""
+    """Return the variables of a result that is part of another, with a prefix."""
     return {f"{prefix}.{name}": one for name, one in labelled.variables.items()}

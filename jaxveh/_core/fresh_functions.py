@@ -1,4 +1,4 @@
-"""Functions that are written inside a loop: a new one at each turn, and with each a program that is compiled anew."""
+"""Functions that are defined inside a loop: each iteration makes a new one, and compiles a new program for it."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 from jaxveh._core.errors import JaxvehWarning
 
 TURNS = 5
-"""So many functions of one place in the source are a loop."""
+"""This many functions from one place in the source are taken for a loop."""
 
 _counts: dict[types.CodeType, int] = {}
 _seen: weakref.WeakSet = weakref.WeakSet()
 
 
 def note_function(who: str, function: Any) -> None:
-    """Warn (`JaxvehWarning`), once a place, where `who` was given function after function from the same line of the source."""
+    """Warn (`JaxvehWarning`), once per place, if `who` is called with new functions from the same line of the source."""
     if not isinstance(function, types.FunctionType) or function in _seen:
         return
     _seen.add(function)
@@ -26,7 +26,7 @@ def note_function(who: str, function: Any) -> None:
     if _counts[code] == TURNS:
         warnings.warn(
             f"{who}: {function.__name__} of {code.co_filename}, line {code.co_firstlineno}, is a new function at each call, "
-            f"{TURNS} so far, and each compiles a program anew. Write it once, outside of the loop, and give it what varies as "
+            f"{TURNS} so far, and each compiles a new program. Define it once, outside of the loop, and pass what varies as "
             "an array.",
             JaxvehWarning,
             stacklevel=3,

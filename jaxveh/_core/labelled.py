@@ -1,6 +1,6 @@
-"""Results as arrays with named dimensions: what data frames, xarray, files and pictures are made of, and results of again.
+"""Results as arrays with named dimensions, the common form for data frames, xarray, files and figures, and back to results.
 
-A result says once what it has, as `Labelled`; whoever shows or writes it knows no more of it than that.
+A result describes itself once, as `Labelled`; code that displays or writes a result uses nothing else.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import numpy as np
 from jaxveh._core.errors import InputError
 
 RUN, TIME, ROW, PARAMETER = "run", "time", "row", "parameter"
-"""Names of dimensions: of a batch, of instants that all runs share, of rows of runs with instants of their own, of parameters."""
+"""Names of dimensions: a batch, instants common to all runs, rows of runs with their own instants, parameters."""
 
 
 class Variable(NamedTuple):
-    """An array with a name for each of its `dims`, and its unit, "" where none is known."""
+    """An array with the names of its `dims`, and its unit, "" if unknown."""
 
     dims: tuple[str, ...]
     values: Any
@@ -27,15 +27,18 @@ class Variable(NamedTuple):
 
 
 class Labelled(NamedTuple):
-    """A result of a `kind` (its class's name): `variables` and `coordinates` by name; `shown`: the variables that a table for
-    people has; `source`: where it came from; `facts`: what else is needed to make it again, plain values."""
+    """A result of a `kind` (the name of its class), as `variables` and `coordinates` by name.
+
+    `shown`: the variables in a displayed table; `source`: its origin; `facts`: further plain values that are needed to make the
+    result again.
+    """
 
     kind: str
     variables: dict[str, Variable]
     coordinates: dict[str, Variable]
     shown: tuple[str, ...]
     source: str = ""
-    facts: dict[str, Any] = {}  # noqa: RUF012  nobody writes into it
+    facts: dict[str, Any] = {}  # noqa: RUF012  it is never written to
 
     @property
     def both(self) -> dict[str, Variable]:
@@ -44,15 +47,17 @@ class Labelled(NamedTuple):
 
 
 def array_again(values: Any, is_jax: bool) -> Any:
-    """An array of its own precision: on the host where jax would not keep it."""
+    """Return an array in its own precision; it stays on the host if JAX would not keep that precision."""
     values = np.asarray(values)
     keeps = jax.dtypes.canonicalize_dtype(values.dtype) == values.dtype
     return jnp.asarray(values) if is_jax and keeps else values
 
 
 def time_axis(time: Any, lead: int) -> tuple[tuple[str, ...], Variable, dict[str, Any]]:
-    """The dimensions of what has a value an instant in each of a batch of `lead` dimensions, the coordinate `time`, and what is
-    to be remembered of its shape: of a batch whose runs have the same instants they are kept once."""
+    """Return the dimensions of a batch over time, with `lead` dimensions before the time axis, its time coordinate, and facts.
+
+    If all runs of a batch have the same instants, these are kept once; the facts record the original shape.
+    """
     values, runs = np.asarray(time), run_axes(lead)
     facts = {"time": values.shape[:-1], "jax": isinstance(time, jax.Array)}
     first = values.reshape(-1, values.shape[-1])[0]
@@ -62,7 +67,7 @@ def time_axis(time: Any, lead: int) -> tuple[tuple[str, ...], Variable, dict[str
 
 
 def time_again(labelled: Labelled) -> Any:
-    """The time that `time_axis` was given."""
+    """Return the original time from the coordinate and the facts of `time_axis`."""
     time, facts = labelled.both.get(TIME), labelled.facts
     if time is None:
         raise InputError("time is missing.")
@@ -73,12 +78,12 @@ def time_again(labelled: Labelled) -> Any:
 
 
 def run_axes(lead: int) -> tuple[str, ...]:
-    """The names of the dimensions of a batch."""
+    """Return the names of the dimensions of a batch."""
     return tuple(RUN if k == 0 else f"{RUN}_{k}" for k in range(lead))
 
 
 def make_again(kind: type, fields: Mapping[str, Any]) -> Any:
-    """An equinox module of these fields as they are, as unflattening makes it: a batch passes no check of one run."""
+    """Make an equinox module with these fields without checks, as unflattening does: a batch would fail the checks of one run."""
     made = object.__new__(kind)
     for name, value in fields.items():
         object.__setattr__(made, name, value)

@@ -1,4 +1,4 @@
-"""Modules of a package, and names inside them, that are imported when they are first asked for."""
+"""Modules of a package, and names inside them, that are imported when they are first used."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from typing import Any
 
 
 def submodules(package: str, names: Iterable[str], inside: Mapping[str, str] | None = None) -> Callable[[str], Any]:
-    """The `__getattr__` of a `package` whose modules `names`, and names `inside` its modules (name to module), are imported when
-    they are first asked for."""
+    """Return the `__getattr__` of a `package` that imports its modules and their names when they are first used.
+
+    `names`: the modules; `inside`: names inside the modules, name to module.
+    """
     known, inside = frozenset(names), dict(inside or {})
 
     def find(name: str) -> Any:

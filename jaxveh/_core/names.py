@@ -13,13 +13,13 @@ from jaxveh._core.errors import InputError, did_you_mean
 @functools.cache
 def _record_type(name: str, fields: tuple[str, ...]):
     made = namedtuple(name, fields)
-    # By this name pickle finds it (`__getattr__`): sent to another process, it is the class that is made there.
+    # pickle finds the class by this name (`__getattr__`), so that another process uses its own class of the same name.
     made.__qualname__ = f"{name}:{','.join(fields)}"
     return made
 
 
 def __getattr__(name: str) -> Any:
-    """The class that `record_type` makes of `Name:field,field`."""
+    """Return the class that `record_type` makes from `Name:field,field`."""
     kind, colon, fields = name.partition(":")
     if not colon:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -27,7 +27,7 @@ def __getattr__(name: str) -> Any:
 
 
 def record_type(name: str, fields: Iterable[str]):
-    """The NamedTuple class of this name and these fields; the same class each time, so that jit sees one structure."""
+    """Return the NamedTuple class of this name and these fields, the same class each time, so that jit sees one structure."""
     fields = tuple(fields)
     twice = sorted({field for field in fields if fields.count(field) > 1})
     if twice:
@@ -36,12 +36,12 @@ def record_type(name: str, fields: Iterable[str]):
 
 
 def record(name: str, values: Mapping):
-    """A NamedTuple instance with the mapping's keys as fields, in their order."""
+    """Return a NamedTuple instance with the mapping's keys as fields, in their order."""
     return record_type(name, values.keys())(*values.values())
 
 
 def as_mapping(values, what: str = "values") -> dict:
-    """A NamedTuple or a mapping as an ordered dict of its fields."""
+    """Return a NamedTuple or a mapping as an ordered dict of its fields."""
     if isinstance(values, Mapping):
         return dict(values)
     if hasattr(values, "_asdict"):
@@ -50,19 +50,19 @@ def as_mapping(values, what: str = "values") -> dict:
 
 
 def as_names(values) -> Any:
-    """Names as a tuple, which a static field must be; a single one is one name, not its letters. None stays None."""
+    """Return names as a tuple, which a static field must be; a single string is one name, not its letters. None stays None."""
     if values is None:
         return None
     return (values,) if isinstance(values, str) else tuple(values)
 
 
 def as_groups(values) -> Any:
-    """Groups of names as a tuple of tuples; a name that stands alone is a group. None stays None."""
+    """Return groups of names as a tuple of tuples; a single name is a group. None stays None."""
     return None if values is None else tuple(as_names(group) for group in values)
 
 
 def check_names(what: str, names: Iterable[str], allowed: Iterable[str]) -> None:
-    """Raise unless every one of `names` is among `allowed`; the message lists what there is."""
+    """Raise `InputError` unless every one of `names` is among `allowed`; the message lists the allowed names."""
     allowed = tuple(allowed)
     unknown = [name for name in names if name not in allowed]
     if unknown:

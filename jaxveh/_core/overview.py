@@ -1,4 +1,4 @@
-"""How a result looks: a line of what it is and a small table, as text for a terminal and as HTML for a notebook."""
+"""The display of a result: a title and a small table, as text for a terminal and as HTML for a notebook."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import jax
 import numpy as np
 
 MOST_ROWS = 14
-"""Rows of the table that are shown at once: with the rest it is less than 20 lines."""
+"""Rows of the table that are shown at once: the whole display has less than 20 lines."""
 
 WIDTH = 96
 LONGEST = 32
-"""Letters of a cell."""
+"""Largest number of characters of a cell."""
 
 MOST_FOLDED = 400
-"""Rows of a table in HTML that can be unfolded."""
+"""Largest number of rows of a table in HTML, including the folded ones."""
 
 POINTS = 120
-"""Of a small curve: it is drawn from the least to the most of so many pieces."""
+"""Number of pieces of a small curve, which is drawn from the smallest to the largest value of each piece."""
 
 
 class Lazy(Sequence):
-    """What a function makes of each of many things, when it is asked for: of those that are not shown nothing is reckoned."""
+    """The results of a function for many things, each computed when it is accessed: those not shown are never computed."""
 
     def __init__(self, things: Sequence[Any], make: Callable[[Any], Any]):
         self._things, self._make = things, make
@@ -37,8 +37,12 @@ class Lazy(Sequence):
 
 
 class Overview(NamedTuple):
-    """`title`: what it is, in a line; `columns` and `rows` of a table of words, whose first `words` columns are no numbers;
-    `curves`: an array (T,) a row to draw small, None without; `count`: how many rows there would be (default: as `rows`)."""
+    """The display of a result.
+
+    `title`: its description in one line; `columns` and `rows`: a table of texts, whose first `words` columns are not numbers;
+    `curves`: an array (T,) per row for a small curve, None for no curve; `count`: the full number of rows (default: that of
+    `rows`).
+    """
 
     title: str
     columns: tuple[str, ...] = ()
@@ -49,7 +53,7 @@ class Overview(NamedTuple):
 
 
 def as_text(overview: Overview) -> str:
-    """The overview in at most `WIDTH` columns and 18 lines."""
+    """Return the overview as text of at most `WIDTH` columns and 18 lines."""
     lines = _wrapped(overview.title)
     rows = [tuple(_cut(cell, LONGEST) for cell in row) for row in overview.rows[:MOST_ROWS]]
     if rows:
@@ -79,7 +83,7 @@ def _cut(text: str, most: int) -> str:
 
 
 def as_html(overview: Overview) -> str:
-    """The overview as a table, the rows beyond `MOST_ROWS` folded away; words are escaped."""
+    """Return the overview as an HTML table, with the rows beyond `MOST_ROWS` folded; texts are escaped."""
     rows = overview.rows[:MOST_FOLDED]
     curves = overview.curves[:MOST_FOLDED] or [None] * len(rows)
     pairs = list(zip(rows, curves, strict=True))
@@ -110,7 +114,7 @@ def _table(overview: Overview, pairs: Iterable[tuple[tuple[str, ...], Any]]) -> 
 
 
 def curve_of(values: Any, width: int = 160, height: int = 24) -> str:
-    """A small curve of values (T,) as SVG, from the least to the most of each piece; gaps where nothing is finite."""
+    """Return a small curve of values (T,) as SVG, from the smallest to the largest value of each piece, with gaps at NaN."""
     if values is None or not is_known(values):
         return ""
     array = _plain(values).astype(np.float64)
@@ -124,7 +128,7 @@ def curve_of(values: Any, width: int = 160, height: int = 24) -> str:
     if not known.any():
         return ""
     bottom, top = low[known].min(), high[known].max()
-    # A flat one lies in the middle; a span beyond the largest number is scaled before it is taken.
+    # A flat curve is drawn in the middle; halving before the subtraction avoids an overflow.
     scale = top / 2 - bottom / 2
     at = lambda value: height / 2 if scale == 0 else height - 2 - (value / 2 - bottom / 2) / scale * (height - 4)
     step = width / max(len(low), 1)
@@ -139,20 +143,20 @@ def curve_of(values: Any, width: int = 160, height: int = 24) -> str:
 
 
 def is_known(values: Any) -> bool:
-    """Whether an array is there to be looked at: a number, and no tracer."""
+    """Whether a value is a concrete number or array, and not a tracer."""
     if isinstance(values, jax.core.Tracer):
         return False
     return isinstance(values, bool | int | float | np.ndarray | np.generic | jax.Array)
 
 
 def _plain(values: Any) -> np.ndarray:
-    """The array, of types that are jax's alone (bfloat16) in single precision."""
+    """Return the array; types that only JAX has (bfloat16) are converted to single precision."""
     array = np.asarray(values)
     return array.astype(np.float32) if array.dtype.kind == "V" and array.dtype.names is None else array
 
 
 def number(value: Any) -> str:
-    """A number in few digits; of an array its shape, least and most; of a tracer its type."""
+    """Format a number in few digits, an array as its shape, smallest and largest value, and a tracer as its type."""
     if isinstance(value, jax.core.Tracer):
         return f"traced {value.dtype}{list(value.shape)}"
     if not is_known(value):
@@ -168,7 +172,7 @@ def number(value: Any) -> str:
 
 
 def span(values: Any) -> tuple[str, str]:
-    """The least and the most of the finite values of an array, as words; `-` without any."""
+    """Return the smallest and the largest finite value of an array as texts; `-` if there are none."""
     if not is_known(values):
         return "-", "-"
     array = _plain(values)
@@ -182,7 +186,7 @@ def span(values: Any) -> tuple[str, str]:
 
 
 def missing_share(values: Any) -> str:
-    """The share of an array that is not finite, in per cent."""
+    """Return the share of an array that is not finite, in per cent."""
     if not is_known(values):
         return "-"
     array = _plain(values)
@@ -193,7 +197,7 @@ def missing_share(values: Any) -> str:
 
 
 def stretch(time: Any) -> str:
-    """Rows, and from when to when, in words."""
+    """Return the number of rows and the span of time, in words."""
     rows = count_of(time.shape[-1], "row")
     if time.ndim > 1:
         return f"{rows}, {count_of(int(np.prod(time.shape[:-1])), 'run')}"
@@ -205,7 +209,7 @@ def stretch(time: Any) -> str:
 
 
 def count_of(count: int, word: str) -> str:
-    """`1 row`, `2 rows`."""
+    """Return a count with its noun: `1 row`, `2 rows`."""
     return (
         f"{count} {word}"
         if count == 1

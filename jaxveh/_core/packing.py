@@ -1,4 +1,4 @@
-"""Trees of arrays as variables with named dimensions, and trees of them again."""
+"""Conversion of trees of arrays to variables with named dimensions, and back."""
 
 from __future__ import annotations
 
@@ -15,23 +15,27 @@ from jaxveh._core.parameters import Parameters, kind_of, value_again
 
 
 class Packing:
-    """Puts trees of arrays into `variables` and `coordinates`; what `add` returns is the plan (plain values) by which `unpack`
-    makes the tree again."""
+    """Puts trees of arrays into `variables` and `coordinates`.
+
+    `add` returns a plan (plain values) from which `unpack` makes the tree again.
+    """
 
     def __init__(self) -> None:
         self.variables: dict[str, Variable] = {}
         self.coordinates: dict[str, Variable] = {}
 
     def add(self, tree: Any, name: str, lead: tuple[str, ...], *, suffix: str = "", inside: str | None = None) -> Any:
-        """The plan of a tree whose leaves begin with the dimensions `lead`. A field of a NamedTuple is `inside` + field +
-        `suffix`; by default `name.field`."""
+        """Add a tree whose leaves begin with the dimensions `lead`, and return its plan.
+
+        The variable of a NamedTuple's field is named `inside` + field + `suffix`, by default `name.field`.
+        """
         stem = f"{name}." if inside is None else inside
         if tree is None:
             return None
         if isinstance(tree, Parameters):
             return self._parameters(tree, name, lead)
         if hasattr(tree, "_asdict"):
-            # Deeper ones have their whole names.
+            # Deeper levels have their full names.
             parts = {field: self.add(one, f"{stem}{field}{suffix}", lead) for field, one in tree._asdict().items()}
             return {"record": type(tree).__name__, "fields": parts}
         if isinstance(tree, Mapping):
@@ -61,9 +65,9 @@ class Packing:
 
 
 def unpack(plan: Any, variables: Mapping[str, Variable], kinds: Mapping[str, Any] | None = None) -> Any:
-    """The tree of a plan; NamedTuples are of these `kinds` by name, else of `record_type`.
+    """Make the tree of a plan; NamedTuples are of the class in `kinds` with their name, otherwise of `record_type`.
 
-    **Raises** `InputError` for a variable that is not there.
+    **Raises** `InputError` for a missing variable.
     """
     if plan is None:
         return None

@@ -1,4 +1,4 @@
-"""Parameters: array leaves of a model with a unit and a domain, and `where`, the one way to pick them."""
+"""Parameters: array leaves of a model with a unit and a domain, and `where`, the only way to pick them."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from jaxveh._core.names import check_names
 Where = Callable[..., object]
 """Picks array leaves, as in `equinox.tree_at`: `lambda car: (car.front.B, car.rear.B)`.
 
-Everywhere it sees what is handed in beside it, as it is: `state_space(car, ..., estimate=where)` the car, `fit_rig(law, rig,
-where)` the tyre, `with_parameters(model, where)` and the fits to recordings the StateSpace, whose car is `m.system.vehicle`. In
-answers a parameter has its name in the car, whatever the car stands in: `front.B`, of each of them.
+It is always called with the object beside it in the arguments: in `state_space(car, ..., estimate=where)` the car, in
+`fit_rig(law, rig, where)` the tyre, in `with_parameters(model, where)` and the fits to recordings the StateSpace, whose car is
+`m.system.vehicle`. In results a parameter has its name in the car, whatever object contains the car: `front.B` in all cases.
 """
 
 UNNAMED = {"named": False}
-"""Metadata of a field that only holds what has the parameters, such as a model's system: names leave it out."""
+"""Metadata of a field that only contains the object with the parameters, such as a model's system: names omit it."""
 
 
 def parameter(unit: str = "-", domain: AbstractBijector | None = None, scale: float | None = None, **kwargs):
@@ -40,7 +40,7 @@ def parameter(unit: str = "-", domain: AbstractBijector | None = None, scale: fl
 
 
 def table(unit: str = "-", domain: AbstractBijector | None = None, scale: float | None = None, **kwargs):
-    """Declare a parameter that may be given as a list of numbers, too."""
+    """Declare a parameter that may also be given as a list of numbers."""
     metadata = {"unit": unit, "domain": Real() if domain is None else domain, "scale": scale}
     return eqx.field(converter=_table_array, metadata=metadata, **kwargs)
 
@@ -50,14 +50,14 @@ def _table_array(value):
 
 
 def positive(unit: str = "-", **kwargs):
-    """Declare a positive parameter (its random walk and its prior live on the logarithm)."""
+    """Declare a positive parameter (its random walk and its prior are those of its logarithm)."""
     return parameter(unit, Positive(), **kwargs)
 
 
 def check_parameters(module: eqx.Module) -> None:
-    """Raise `InputError` unless every declared parameter of a module is finite, and positive where it says so.
+    """Raise `InputError` unless every declared parameter of a module is finite, and positive if declared positive.
 
-    For `__check_init__`; a parameter that is None (an option that is off) passes, and so do tracers.
+    For use in `__check_init__`; a parameter that is None (an option that is off) passes, and so do tracers.
     """
     for field in dataclasses.fields(module):
         value, domain = getattr(module, field.name), field.metadata.get("domain")
@@ -89,9 +89,9 @@ class _Mark:
 
 
 def resolve(model, where: Where | None) -> tuple[Parameter, ...]:
-    """The parameters that `where` picks from `model`, in the order of `where`; names come from the tree's paths.
+    """Return the parameters that `where` picks from `model`, in the order of `where`; names come from the tree's paths.
 
-    Raises `InputError` where `where` picks something that is no array leaf, or the same leaf twice.
+    Raises `InputError` if `where` picks something that is not an array leaf, or the same leaf twice.
     """
     if where is None:
         return ()
@@ -110,7 +110,7 @@ def resolve(model, where: Where | None) -> tuple[Parameter, ...]:
         if not isinstance(leaf, _Mark):
             raise InputError(f"where picked {leaf!r}: it must pick array leaves of {type(model).__name__}.")
         value = paths[leaf.index][1]
-        # Not `is_inexact_array_like`: it trips over tracers.
+        # Not `is_inexact_array_like`, which fails for tracers.
         if not (eqx.is_inexact_array(value) or isinstance(value, float)):
             name = _path_name(paths[leaf.index][0])
             raise InputError(f"where picked {name} = {value!r}: it must pick array leaves of {type(model).__name__}.")
@@ -120,19 +120,19 @@ def resolve(model, where: Where | None) -> tuple[Parameter, ...]:
     found = [_describe(model, paths[i][0]) for i in indices]
     if len(set(indices)) < len(indices):
         twice = [p.name for p, i in zip(found, indices, strict=True) if indices.count(i) > 1]
-        raise InputError(f"where picked {twice[0]} twice: each leaf can be chosen once.")
+        raise InputError(f"where picked {twice[0]} twice: each leaf can be chosen only once.")
     return tuple(_tell_apart(found))
 
 
 def every_parameter(model) -> dict[str, Parameter]:
-    """All floating leaves of a model by name (`front.B`); those that would share one by their whole paths."""
+    """Return all floating leaves of a model by name (`front.B`); leaves that would share a name have their full paths."""
     leaves = jtu.tree_flatten_with_path(model)[0]
     numbers = [path for path, leaf in leaves if eqx.is_inexact_array(leaf) or isinstance(leaf, float)]
     return {p.name: p for p in _tell_apart([_describe(model, path) for path in numbers])}
 
 
 def _tell_apart(found: list[Parameter]) -> list[Parameter]:
-    """The parameters, those that would share a name by their whole paths."""
+    """Return the parameters, with their full paths as names where two would share a name."""
     names = [p.name for p in found]
     return [p if names.count(p.name) == 1 else _with_name(p, p.path) for p in found]
 
@@ -146,14 +146,14 @@ def _path_name(path) -> str:
 
 
 def _metadata(owner: Any, name: str, otherwise: Any) -> Any:
-    """What the field's declaration says; a NamedTuple inside a field has that field's."""
+    """Return the metadata of the field's declaration; a NamedTuple inside a field has that field's metadata."""
     if not dataclasses.is_dataclass(owner):
         return otherwise
     return {f.name: f.metadata for f in dataclasses.fields(owner)}.get(name, {})
 
 
 def _only_holds(owner: Any, metadata: Any) -> bool:
-    """Whether the field says so itself: what stands in a NamedTuple there has no declaration of its own."""
+    """Whether the field itself is declared `UNNAMED`; fields of a NamedTuple inside it have no declaration of their own."""
     return dataclasses.is_dataclass(owner) and not metadata.get("named", True)
 
 
@@ -180,12 +180,12 @@ def _describe(model, path) -> Parameter:
 
 
 def pick(model, parameters: tuple[Parameter, ...]) -> list:
-    """The leaves of these parameters, in order."""
+    """Return the leaves of these parameters, in order."""
     return [_get(model, p.path) for p in parameters]
 
 
 def put(model, parameters: tuple[Parameter, ...], values):
-    """The model with these leaves replaced by `values` (`None` takes a leaf out)."""
+    """Return the model with these leaves replaced by `values` (`None` removes a leaf)."""
     paths = [p.path for p in parameters]
     return eqx.tree_at(
         lambda m: [_get(m, path) for path in paths], model, replace=list(values), is_leaf=lambda leaf: leaf is None
@@ -201,12 +201,12 @@ def _get(model, path: str):
 
 
 def share_of(p: Parameter, relative: Mapping):
-    """The entry of a mapping for a parameter, by its name (`front.B`) or else by the last part (`B`); None without."""
+    """Return a mapping's entry for a parameter, by its name (`front.B`), otherwise by the last part (`B`); None if absent."""
     return relative.get(p.name, relative.get(p.name.split(".")[-1]))
 
 
 def check_shares(what: str, parameters: tuple[Parameter, ...], relative) -> None:
-    """Raise where a mapping of spreads has a name that is no parameter's: a slip of the pen would go unseen."""
+    """Raise `InputError` if a mapping of spreads has a name of no parameter: a typing error would go unnoticed."""
     if isinstance(relative, Mapping):
         check_names(
             what, relative, [name for p in parameters for name in dict.fromkeys((p.name, p.name.split(".")[-1]))]
@@ -214,12 +214,12 @@ def check_shares(what: str, parameters: tuple[Parameter, ...], relative) -> None
 
 
 def prior_spread(parameters: tuple[Parameter, ...], values, relative, what: str = "prior") -> list[jax.Array]:
-    """Standard deviations on the real line for a relative spread, one a parameter.
+    """Return standard deviations on the real line for a relative spread, one per parameter.
 
     `relative` is one number, or a mapping from parameter names (`front.B`, or the last part `B`) to numbers; a
-    parameter whose domain is the whole line refers to its declared `scale`, else to its absolute value.
+    parameter whose domain is the whole line refers to its declared `scale`, otherwise to its absolute value.
     Raises `InputError` for a spread that is not positive, an unbounded parameter at zero without a scale, or a name
-    that is no parameter's. `what` is what the messages call the spreads.
+    of no parameter. `what` is the name of the spreads in messages.
     """
     check_shares(what, parameters, relative)
     spreads = []
@@ -246,5 +246,5 @@ def prior_spread(parameters: tuple[Parameter, ...], values, relative, what: str 
 
 _ADVICE = {
     False: "A parameter that is known exactly should not be estimated: leave it out of `where`.",
-    True: "It is relative to the value: one at zero needs a `scale`. One that is known exactly is left out of `where`.",
+    True: "It is relative to the value: a parameter at zero needs a `scale`. Leave one that is known exactly out of `where`.",
 }

@@ -14,18 +14,18 @@ from jaxveh._core.shown import Shown
 
 
 class WithParameters(Shown):
-    """A module whose array leaves are parameters. `called`: what it is, in a word."""
+    """A module whose array leaves are parameters. `called`: its kind, in a word."""
 
     __slots__ = ()
 
     called = "model"
 
     def to_pandas(self) -> Any:
-        """A `pandas.DataFrame` with a row a parameter: `parameter`, `value` and `unit`."""
+        """Return a `pandas.DataFrame` with a row per parameter: `parameter`, `value` and `unit`."""
         return super().to_pandas()
 
     def _leaves(self) -> dict[str, tuple[Parameter, Any]]:
-        """Every parameter and its value by name, in the order of the tree."""
+        """Return every parameter and its value by name, in the order of the tree."""
         values = {"".join(_word(step) for step in path): leaf for path, leaf in jtu.tree_flatten_with_path(self)[0]}
         return {name: (p, values[f".{p.path}"]) for name, p in every_parameter(self).items()}
 
@@ -33,14 +33,14 @@ class WithParameters(Shown):
         leaves = self._leaves()
         title = f"{type(self).__name__}: {self.called}, {count_of(len(leaves), 'parameter')}"
         row = lambda name: (name, number(leaves[name][1]), leaves[name][0].unit)
-        # Its own before those of its parts.
+        # Its own parameters before those of its parts.
         names = sorted(leaves, key=lambda name: name.count("."))
         return Overview(title, ("parameter", "value", "unit"), Lazy(names, row))
 
     def _labelled(self) -> Labelled:
         leaves = self._leaves()
         shapes = {np.shape(value) for _, value in leaves.values()}
-        # A table of numbers inside (a curve over speed) is no row of a table: each of its numbers is.
+        # A parameter that is an array (a curve over speed) has one row per number.
         flat = {}
         for name, (p, value) in leaves.items():
             array = np.asarray(value)

@@ -1,4 +1,4 @@
-"""Estimated, fitted and bounded parameters: values by name, as in the car, whoever made them."""
+"""Estimated, fitted and bounded parameters: values by the parameters' names in the car."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from jaxveh._core.shown import Kept
 
 @jtu.register_pytree_with_keys_class
 class Parameters(Kept, Mapping):
-    """Values by a parameter's name, in the order of `where`: a mapping, and a pytree with one leaf a parameter.
+    """Values by a parameter's name, in the order of `where`: a mapping, and a pytree with one leaf per parameter.
 
         found["front.B"]        by name
         found.front.B           the same, as in the car
-        found.front             those of the front axle: `Parameters` again, as `found["front"]`
+        found.front             those of the front axle: again `Parameters`, as `found["front"]`
         found.array()           all in one array, (p, ...)
 
-    What the values are is said where they are returned: estimates (T,), fitted numbers, standard deviations, bounds.
+    The function that returns them defines the values: estimates (T,), fitted numbers, standard deviations, bounds.
 
-    A parameter that is named as one of the methods (`plot`, `save`, ...) is found by `["plot"]` alone.
+    A parameter with the name of a method (`plot`, `save`, ...) is accessible only as `["plot"]`.
 
-    **Raises** `KeyError` (by name) or `AttributeError` for what is not there, with what is.
+    **Raises** `KeyError` (by name) or `AttributeError` for an unknown parameter, with a list of the known ones.
     """
 
     __slots__ = ("_values",)
@@ -48,7 +48,7 @@ class Parameters(Kept, Mapping):
         return Parameters(part)
 
     def __getattr__(self, name: str) -> Any:
-        # Only what is not found otherwise comes here; `copy` and `pickle` ask before there are values.
+        # Only names that are not found otherwise come here; `copy` and `pickle` call it before there are values.
         if name.startswith("_"):
             raise AttributeError(name)
         try:
@@ -66,18 +66,18 @@ class Parameters(Kept, Mapping):
         return len(self._values)
 
     def plot(self, truth: Mapping[str, Any], *arguments: Any, **options: Any) -> Any:
-        """How far they are from a `truth` by the same names (`plots.fit`). **Returns** the figure."""
+        """Draw their distance from a `truth` with the same names (`plots.fit`). **Returns** the figure."""
         return super().plot(truth, *arguments, **options)
 
     def to_pandas(self) -> Any:
-        """A `pandas.DataFrame` with a row a parameter: `parameter` and `value`; arrays have a row an element."""
+        """Return a `pandas.DataFrame` with a row per parameter: `parameter` and `value`; arrays have a row per element."""
         return super().to_pandas()
 
     @classmethod
     def from_pandas(cls, frame: Any) -> Parameters:
-        """The parameters of a data frame with the columns `parameter` and `value`, a number each.
+        """Make the parameters from a data frame with the columns `parameter` and `value`, one number each.
 
-        **Raises** `InputError` for a frame without them, or one in which a name is there twice.
+        **Raises** `InputError` for a frame without these columns, or with a duplicate name.
         """
         lost = [name for name in ("parameter", "value") if name not in getattr(frame, "columns", ())]
         if lost:
@@ -85,11 +85,11 @@ class Parameters(Kept, Mapping):
         names = [str(name) for name in frame["parameter"]]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise InputError(f"Parameters.from_pandas: {', '.join(twice)} is there twice: must be a row a parameter.")
+            raise InputError(f"Parameters.from_pandas: {', '.join(twice)} occurs twice: must be one row per parameter.")
         return cls(dict(zip(names, jnp.asarray(frame["value"].to_numpy()), strict=True)))
 
     def stack(self) -> np.ndarray | None:
-        """The values in one array (p, ...) of NumPy; None where they are of several kinds, shapes or types, or there are none."""
+        """Return the values in one array (p, ...) of NumPy; None if kinds, shapes or types differ, or there are no values."""
         values = list(self._values.values())
         kinds = {(kind_of(value), np.shape(value), np.asarray(value).dtype) for value in values}
         return np.stack([np.asarray(value) for value in values]) if len(kinds) == 1 else None
@@ -109,7 +109,7 @@ class Parameters(Kept, Mapping):
     @classmethod
     def _of_labelled(cls, labelled: Labelled) -> Parameters:
         names, kinds, variables = labelled.facts["names"], labelled.facts["kinds"], labelled.both
-        # One parameter may be called `value` itself, with another beside it.
+        # A parameter may itself be named `value`, with another one beside it.
         is_stacked = len(variables) == 2 and PARAMETER in variables["value"].dims if "value" in variables else False
         of = lambda k, name: variables["value"].values[k] if is_stacked else variables[name].values
         return cls(
@@ -124,17 +124,17 @@ class Parameters(Kept, Mapping):
         return Parameters, (self._values,)
 
     def array(self) -> Any:
-        """The values in one array, (p, ...), in their order."""
+        """Return the values in one array, (p, ...), in their order."""
         values = list(self._values.values())
         return (jnp if any(isinstance(value, jax.Array) for value in values) else np).stack(values)
 
     def tree_flatten_with_keys(self):
-        """The leaves with their names."""
+        """Return the leaves with their names."""
         return [(jtu.DictKey(name), value) for name, value in self._values.items()], tuple(self._values)
 
     @classmethod
     def tree_unflatten(cls, names: tuple[str, ...], values) -> Parameters:
-        """The same names with other values."""
+        """Return parameters of the same names with other values."""
         return cls(dict(zip(names, values, strict=True)))
 
     def _without(self, name: str) -> str:
@@ -145,7 +145,7 @@ PLAIN = {"bool": bool, "int": int, "float": float}
 
 
 def kind_of(value: Any) -> str:
-    """What kind of number or array it is."""
+    """Return the kind of a number or an array."""
     if isinstance(value, jax.Array):
         return "jax"
     return (
@@ -158,7 +158,7 @@ def kind_of(value: Any) -> str:
 
 
 def value_again(values: Any, kind: str) -> Any:
-    """A value of this kind."""
+    """Return a value of this kind."""
     if kind in PLAIN:
         return PLAIN[kind](values)
     return np.asarray(values)[()] if kind == "scalar" else array_again(np.asarray(values), kind == "jax")

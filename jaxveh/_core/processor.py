@@ -1,4 +1,4 @@
-"""Which kind of processor this is: what is compiled for one does not run on another, and does not round as there."""
+"""The kind of the processor: a program compiled for one kind may not run on another, or rounds differently."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import sys
 from pathlib import Path
 
 SAID = ("vendor_id", "model name", "flags", "Features", "CPU implementer", "CPU part")
-"""Lines of Linux's description that tell kinds apart; others tell how fast it is at the moment."""
+"""Lines of Linux's description that identify the kind; other lines change, such as the current speed."""
 
 
 def processor() -> str:
-    """The machine's name and a hash of the processor's model and features, `x86_64-9dbd76df0de6`."""
+    """Return the machine's name and a hash of the processor's model and features, such as `x86_64-9dbd76df0de6`."""
     said = [sys.platform, platform.machine(), platform.processor(), os.environ.get("PROCESSOR_IDENTIFIER", "")]
     described = Path("/proc/cpuinfo")
     if described.exists():

@@ -1,4 +1,4 @@
-"""The progress protocol: long host-side work reports to a callable; jaxveh itself prints nothing."""
+"""The progress protocol: long work on the host reports to a callable; jaxveh itself prints nothing."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """Called with the work done so far, the work in all, and a short description of the current stage."""
+    """Called with the work done so far, the total work, and a short description of the current stage."""
 
     def __call__(self, done: float, total: float, stage: str) -> None: ...
 
 
 def silent(done: float, total: float, stage: str) -> None:
-    """The default: says nothing."""
+    """The default: report nothing."""
 
 
 def part(report: Progress, first: float, last: float, name: str) -> Progress:
-    """The progress of a part of the work, told as the share from `first` to `last` of the whole."""
+    """Return a callable for a part of the work, which is reported as the share from `first` to `last` of the whole."""
     return lambda done, total, stage: report(first + (last - first) * done / total, 1.0, f"{name}: {stage}")

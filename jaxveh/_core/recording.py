@@ -1,4 +1,4 @@
-"""A recording: named channels over one time base, with units and a note of where it came from."""
+"""A recording: named channels over one time base, with units and a note about its source."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Recording(Kept, eqx.Module):
     """Named channels over one time base.
 
     **Fields**: `time` (T,) in seconds, strictly increasing, steps may be irregular. `channels`: a mapping from name to
-    (T,) array, NaN where a sensor did not speak. `units`: name to unit string. `source`: where it came from.
+    (T,) array, NaN where a sensor has no sample. `units`: name to unit string. `source`: a note about its source.
 
     Channels of a simulation's truth are named `true.<name>`; `recording.truth` is a recording of those alone.
-    Units and source are static: a jitted function that takes a whole recording compiles anew when they change, so
-    `jaxveh.run` hands only the arrays to its compiled part.
+    Units and source are static: a jitted function that takes a whole recording is compiled again when they change, so
+    `jaxveh.run` passes only the arrays to its compiled part.
 
     **Raises** `InputError` for an empty log, channels of another length, non-monotonic or non-finite time.
     """
@@ -40,7 +40,7 @@ class Recording(Kept, eqx.Module):
     source: str = eqx.field(static=True)
 
     def __init__(self, time, channels: Mapping[str, object], units: Mapping[str, str] | None = None, source: str = ""):
-        # Stamps of a long log need float64 even where everything else runs in float32: they stay on the host.
+        # Time stamps of a long log need float64 even if everything else runs in float32: they stay on the host.
         self.time = time if isinstance(time, jax.Array) else np.asarray(time, dtype=np.float64)
         self.channels = {str(name): _float(values) for name, values in channels.items()}
         self.units = tuple(sorted((units or {}).items()))
@@ -61,18 +61,20 @@ class Recording(Kept, eqx.Module):
                 k = int(np.argmax(steps <= 0))
                 raise InputError(
                     f"recording: time[{k + 1}] = {time[k + 1]} after time[{k}] = {time[k]}: must be strictly "
-                    "increasing. Two drives in one file? Cut them apart where time steps back; else sort the rows and drop "
-                    "repeated stamps."
+                    "increasing. Two drives in one file? Split them where time steps back; otherwise sort the rows and drop "
+                    "repeated time stamps."
                 )
 
     @classmethod
     def from_pandas(cls, frame: Any) -> Recording:
-        """The recording of a data frame: a channel a column; see `io.from_frame` for time and units. A frame of `to_pandas` gives
-        what it was made of."""
+        """Make a recording from a data frame with a channel per column, such as one of `to_pandas`.
+
+        See `io.from_frame` for time and units.
+        """
         return above("io", "from_frame")(frame)
 
     def to_pandas(self) -> Any:
-        """A `pandas.DataFrame` with a column `time` and one a channel; units in `frame.attrs["units"]`. See `io.to_frame`."""
+        """Return a `pandas.DataFrame`: `time` and a column per channel; units in `frame.attrs["units"]`. See `io.to_frame`."""
         return above("io", "to_frame")(self) if self.time.ndim == 1 else Kept.to_pandas(self)
 
     def __getitem__(self, name: str) -> jax.Array:
@@ -87,19 +89,19 @@ class Recording(Kept, eqx.Module):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The channels' names."""
+        """The names of the channels."""
         return tuple(self.channels)
 
     def unit(self, name: str) -> str:
-        """The unit of a channel, or `-` where none was given."""
+        """Return the unit of a channel, or `-` if none is given."""
         return dict(self.units).get(name, "-")
 
     @property
     def truth(self) -> Recording:
-        """The simulated truth alone, under its plain names; raises where there is none."""
+        """The simulated truth alone, under its plain names; raises `InputError` if there is none."""
         names = [name for name in self.channels if name.startswith(TRUTH)]
         if not names:
-            raise InputError("recording.truth: this recording has no `true.` channels; only simulations carry truth.")
+            raise InputError("recording.truth: this recording has no `true.` channels; only simulations have a truth.")
         units = dict(self.units)
         return Recording(
             self.time,
@@ -109,39 +111,39 @@ class Recording(Kept, eqx.Module):
         )
 
     def replace(self, source: str | None = None, units: Mapping[str, str] | None = None, **channels) -> Recording:
-        """A copy with channels added or replaced by keyword ((T,) arrays), and units of those that are new."""
+        """Return a copy with channels added or replaced by keyword ((T,) arrays), and `units` of new channels."""
         merged = {**dict(self.units), **(units or {})}
         return Recording(self.time, {**self.channels, **channels}, merged, self.source if source is None else source)
 
     def select(self, names) -> Recording:
-        """Only these channels."""
+        """Return a recording of these channels alone."""
         check_names("recording.select", names, self.channels)
         units = {name: unit for name, unit in self.units if name in names}
         return Recording(self.time, {name: self.channels[name] for name in names}, units, self.source)
 
     def without(self, *names: str) -> Recording:
-        """All but these channels, so that nothing downstream can see them."""
+        """Return a recording without these channels, so that nothing downstream can use them."""
         check_names("recording.without", names, self.channels)
         return self.select([name for name in self.channels if name not in names])
 
     def between(self, start: float, end: float) -> Recording:
-        """The rows with start <= time < end; raises where there are none (the log's own time)."""
+        """Return the rows with start <= time < end, in the log's own time; raise `InputError` if there are none."""
         time = np.asarray(self.time)
         rows = np.flatnonzero((time >= start) & (time < end))
         if rows.size == 0:
-            raise InputError(f"span {start}:{end}: holds no row; the log runs from {time[0]} to {time[-1]} s.")
+            raise InputError(f"span {start}:{end}: contains no row; the log runs from {time[0]} to {time[-1]} s.")
         return self.rows(slice(int(rows[0]), int(rows[-1]) + 1))
 
     def rows(self, which: slice) -> Recording:
-        """The rows of a slice."""
+        """Return the rows of a slice."""
         channels = {name: values[which] for name, values in self.channels.items()}
         return Recording(self.time[which], channels, dict(self.units), self.source)
 
     def fill(self, channel: str, method: str = "hold", max_gap: float = np.inf) -> Recording:
         """Fill NaNs of one channel by `hold` (last value) or `linear`, over gaps of at most `max_gap` seconds.
 
-        A gap is the time between the finite samples on its two sides. What is longer, or lies before the first or
-        after the last finite sample where the method cannot reach, stays NaN. Host side, outside jit.
+        A gap is the time between the finite samples on its two sides. Longer gaps stay NaN, and so do rows before the first
+        finite sample, and for `linear` those after the last. Runs on the host, outside jit.
         """
         check_one_of("method", method, ("hold", "linear"))
         values, time = np.array(self[channel]), np.asarray(self.time)
@@ -198,7 +200,7 @@ class Recording(Kept, eqx.Module):
 
 
 def _of_strangers(labelled: Labelled) -> Recording:
-    """Every variable that is over the dimension `time` alone."""
+    """Make a recording of every variable whose only dimension is `time`."""
     time = labelled.both.get(TIME)
     if time is None or time.dims != (TIME,):
         raise InputError(

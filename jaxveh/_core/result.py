@@ -1,4 +1,4 @@
-"""Result codes: failure is data, it travels with results through jit, vmap and scan."""
+"""Result codes: a failure is a value that is passed on with the results through jit, vmap and scan."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import jax.numpy as jnp
 
 
 class Result(IntEnum):
-    """What became of a computation; 0 is success and the first failure of a run is kept.
+    """The outcome of a computation; 0 is success, and the first failure of a run is kept.
 
-    The last two are remarks on a row (`filters.Info.remark`), after which a run goes on.
+    The last two are remarks about a row (`filters.Info.remark`), after which a run continues.
     """
 
     successful = 0
@@ -26,7 +26,7 @@ class Result(IntEnum):
 
     @property
     def message(self) -> str:
-        """What happened and what to do about it."""
+        """The problem and the remedy, in words."""
         return _MESSAGES[self]
 
 
@@ -38,24 +38,24 @@ _MESSAGES = {
     "noise or the prior, use a heavy-tailed noise law, or more particles)",
     Result.non_finite_input: "an input or a measurement is infinite, or an input is NaN (fill gaps with recording.fill)",
     Result.non_finite_state: "the state is no longer finite (the model diverged: check parameters, step and signs)",
-    Result.not_converged: "the solver stopped before its tolerance was met (more steps, or better start values)",
+    Result.not_converged: "the solver stopped before its tolerance was met (use more steps, or better start values)",
     Result.too_stiff: "the step is too long for the model's fastest pole (shorten the step or choose an implicit solver)",
-    Result.measurement_too_late: "a measurement is older than the rows that are kept, and was left out (keep more: depth)",
-    Result.lookahead_misled: "the measurement contradicts what was looked ahead for: weights vary at least twice as much as "
-    "without, and the log-likelihood is low (look ahead with the process noise, PredictiveLikelihood, or not at all, "
+    Result.measurement_too_late: "a measurement is older than the rows that are kept, and was not used (increase depth)",
+    Result.lookahead_misled: "the measurement contradicts the lookahead: weights vary at least twice as much as "
+    "without it, and the log-likelihood is low (look ahead with the process noise, PredictiveLikelihood, or not at all, "
     "ParticleFilter)",
     Result.transport_not_converged: "the transport plan did not converge, and particles were resampled systematically "
-    "instead (more iterations, or a larger epsilon)",
+    "instead (use more iterations, or a larger epsilon)",
 }
 
 
 def code(result: Result):
-    """The int32 scalar that stands for a result inside jit."""
+    """Return the int32 scalar of a result inside jit."""
     return jnp.int32(int(result))
 
 
 def first_failure(codes):
-    """The first non-zero code along axis 0 and its index (-1 where all succeeded); codes: (T,) int32."""
+    """Return the first non-zero code along axis 0 and its index (-1 if all succeeded); codes: (T,) int32."""
     failed = codes != 0
     index = jnp.argmax(failed)
     any_failed = jnp.any(failed)

@@ -1,11 +1,12 @@
-"""What results have in common for people: tables, files, pictures, and how they look in a terminal and a notebook.
+"""Methods that all results share: tables, files, figures, and the display in a terminal and a notebook.
 
-Rooms import downwards only, and optional libraries stay in rooms of their own; yet `recording.plot()` belongs to the recording,
-which stands below them all. So the methods here find what does the work by its name, when they are called, and in this module
-alone: nothing is imported before somebody asks for it, and a missing library is told of by the room that needs it. A class says
-what it is as `Labelled` (for tables and files) and as an `Overview` (for people); it knows neither pandas nor matplotlib.
+Subpackages import only downwards, and optional libraries are used in certain subpackages only; yet `recording.plot()` is a method
+of the recording, which is below all of them. So the methods in this module, and only here, find the function that does the work
+by its name when they are called: nothing is imported before it is needed, and the subpackage that needs a missing library reports
+it. A class describes itself as `Labelled` (for tables and files) and as an `Overview` (for display); it uses neither pandas nor
+matplotlib.
 
-The mixins have no fields, so that a module of equinox that takes one stays the same tree for `jit`, `vmap` and `grad`.
+The mixins have no fields, so that an equinox module with one of them remains the same tree for `jit`, `vmap` and `grad`.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from jaxveh._core.overview import Overview, as_html, as_text
 
 
 def above(room: str, name: str) -> Any:
-    """What a room lists under a name, for a method of a lower one: `above("plots", "recording")`."""
+    """Return the public object of a name in a higher subpackage, for a method in a lower one: `above("plots", "recording")`."""
     return getattr(importlib.import_module(f"jaxveh.{room}"), name)
 
 
 class Shown:
-    """What is shown to people: in a terminal, in a notebook, as a figure, as a table.
+    """Objects that are displayed: in a terminal, in a notebook, as a figure, as a table.
 
     A class has `_overview()`, `_labelled()`, and in `drawn_by` the name of its figure in `jaxveh.plots`.
     """
@@ -44,34 +45,34 @@ class Shown:
         return self._as(as_text)
 
     def _repr_html_(self) -> str:
-        """The overview as HTML, for notebooks: no script, no network."""
+        """Return the overview as HTML for notebooks, without scripts and network access."""
         return self._as(as_html)
 
     def _as(self, form: Callable[[Overview], str]) -> str:
-        # Whatever is inside (tracers, shapes of a batch, something that a transformation put there): a message that shows an
-        # object must not fail because of it.
+        # Whatever the object contains (tracers, shapes of a batch, values from a transformation), a message that shows it must
+        # not fail.
         try:
             return form(self._overview())
         except Exception as error:
             return form(Overview(f"{type(self).__name__} that cannot be shown: {type(error).__name__}"))
 
     def plot(self, *arguments: Any, **options: Any) -> Any:
-        """The figure of `jaxveh.plots` for it, with that function's further arguments. **Returns** the figure."""
+        """Draw it with its function of `jaxveh.plots`, which takes the further arguments. **Returns** the figure."""
         return above("plots", self.drawn_by)(self, *arguments, **options)
 
     def to_pandas(self) -> Any:
-        """A `pandas.DataFrame`, a row for each instant, parameter or run; units in `frame.attrs["units"]`, or a column `unit`."""
+        """Return a `pandas.DataFrame` with a row per instant, parameter or run; units in `frame.attrs["units"]` or `unit`."""
         return above("io.kit", "frame_of")(self._labelled())
 
     def to_xarray(self) -> Any:
-        """An `xarray.Dataset` with everything: dimensions by name, units and source as attributes."""
+        """Return an `xarray.Dataset` with all values: dimensions by name, units and source as attributes."""
         return above("io.kit", "dataset_of")(self._labelled())
 
 
 class Kept(Shown):
-    """What is shown, and can be kept: in xarray and in files, and made of them again.
+    """Objects that are displayed and can be stored, in xarray and in files, and read back.
 
-    A class has `_of_labelled(labelled)` as well, which makes one of what `_labelled` said.
+    A class also has `_of_labelled(labelled)`, which makes an object from the result of `_labelled`.
     """
 
     __slots__ = ()
@@ -82,24 +83,24 @@ class Kept(Shown):
 
     @classmethod
     def from_xarray(cls, dataset: Any) -> Self:
-        """What `to_xarray` made a dataset of, every number and type as it was.
+        """Make it from a dataset of `to_xarray`, with all numbers and types unchanged.
 
-        **Raises** `InputError` for a dataset of something else.
+        **Raises** `InputError` for a dataset of another kind.
         """
         return above("io.kit", "of_dataset")(cls, dataset)
 
     def save(self, path: str | os.PathLike, *, overwrite: bool = False) -> None:
-        """Write it as `.nc` (NetCDF, which xarray opens) or `.parquet` (which pandas opens); `load` gives it back.
+        """Write it as `.nc` (NetCDF, which xarray opens) or `.parquet` (which pandas opens); `load` reads it back.
 
-        The file appears as a whole or not at all. **Raises** `InputError` for another suffix, or where the file exists and
+        The file is written completely or not at all. **Raises** `InputError` for another suffix, or if the file exists and
         `overwrite` is False.
         """
         above("io.kit", "save_result")(self, path, overwrite)
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> Self:
-        """What `save` wrote, every number and type as it was.
+        """Read a file of `save`, with all numbers and types unchanged.
 
-        **Raises** `InputError` for another suffix, a damaged file, or one of something else.
+        **Raises** `InputError` for another suffix, a damaged file, or a file of another kind.
         """
         return above("io.kit", "load_result")(cls, path)

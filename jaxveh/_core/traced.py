@@ -1,4 +1,4 @@
-"""A function that is traced once for all of its calls with operands alike."""
+"""A function that is traced once for all of its calls with operands of the same structure."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 
 
 def trace_once(function: Callable, *operands: Any) -> Any:
-    """`function(*operands)` inside a larger program: where operands of the same shapes have been given before, its trace is taken
-    again, and so are those of its derivatives and batches.
+    """Call `function(*operands)` inside a larger program, and reuse its trace for operands of the same shapes.
 
-    For what a program calls several times (the rates in each stage of a step, a tyre's law on each wheel). XLA puts the calls
-    together again: what runs is the same. The gradient of an unscented filter's likelihood by the tyres of a single track is
-    traced in 2.9 instead of 7.2 s, has 10 instead of 26 thousand lines, and compiles in 8.9 instead of 10.3 s.
+    The traces of its derivatives and batches are reused too. It is for functions that a program calls several times (the rates
+    in each stage of a step, a tyre's law on each wheel). XLA inlines the calls, so that the running program is the same. The
+    gradient of an unscented filter's likelihood with respect to the tyres of a single track is traced in 2.9 instead of 7.2 s,
+    has 10 instead of 26 thousand lines, and compiles in 8.9 instead of 10.3 s.
 
-    `operands` are trees of arrays; what is no array in them must be hashable, and so must `function`, which must not close over
+    `operands` are trees of arrays; leaves that are not arrays must be hashable, and so must `function`, which must not close over
     arrays. Outside any trace it is an ordinary call.
     """
     leaves, structure = jax.tree.flatten(operands)
@@ -40,7 +40,7 @@ def _is_array(leaf: Any) -> bool:
 
 
 class _Known:
-    """A leaf that is known while tracing; unlike in Python, 1, 1.0 and True differ, and 0.0 and -0.0."""
+    """A leaf that is known while tracing; unlike in Python, 1, 1.0 and True differ, and so do 0.0 and -0.0."""
 
     def __init__(self, value: Any):
         self.value = value

@@ -1,3 +1,3 @@
-"""The package's version, where every room can see it."""
+"""The package's version, which every subpackage can import."""
 
 VERSION = "0.2.0"

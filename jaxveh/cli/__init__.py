@@ -1,4 +1,4 @@
-"""The `jaxveh` command: thin programs over the library; every number they show can be had by calling it."""
+"""The `jaxveh` command: thin programs over the library, whose functions give every number that they show."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def leave(end: SystemExit) -> NoReturn:
-    """End the process at once: taking hundreds of compiled programs apart one by one takes up to a second."""
+    """End the process at once: deleting hundreds of compiled programs one by one takes up to a second."""
     if not (end.code is None or isinstance(end.code, int)):
         raise end
     sys.stdout.flush()
@@ -45,13 +45,15 @@ def leave(end: SystemExit) -> NoReturn:
 
 
 def prepare() -> None:
-    """Wide vectors (unless XLA_FLAGS says otherwise), float64, and compiled programs kept between starts: before anything is
-    computed, and in programs only."""
-    # Traces and programs are many objects that live long: looking through them for cycles took a tenth of a program's time.
+    """Set wide vectors (unless XLA_FLAGS sets a width), float64, and a cache of compiled programs, before anything is computed.
+
+    Programs alone do this; the library changes no such setting.
+    """
+    # Traces and programs are many long-lived objects: the garbage collector's search for cycles took a tenth of the run time.
     gc.set_threshold(200_000, 20, 50)
     flags = os.environ.get("XLA_FLAGS", "")
     if VECTOR_WIDTH not in flags:
-        # XLA reads its flags when the first computation starts, which importing jax is not.
+        # XLA reads its flags when the first computation starts; importing jax does not read them.
         os.environ["XLA_FLAGS"] = f"{flags} {VECTOR_WIDTH}=512".strip()
     import jax
 

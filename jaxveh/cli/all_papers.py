@@ -1,6 +1,6 @@
-"""`jaxveh reproduce all`: every paper in a process of its own, as many at a time as there are cores.
+"""`jaxveh reproduce all`: every paper in a process of its own, as many at once as there are cores.
 
-Most of a paper's time is compiling, which takes one core; two papers beside each other take little longer than one.
+Most of a paper's time is compilation, which uses one core; two papers side by side take little longer than one.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from jaxveh.cli.output import plain
 from jaxveh.io import write_text
 
 SLOWEST = ("model-adaptive-pf", "sideslip-review", "tyre-apf", "mass-grade-aukf", "federated-ckf")
-"""In this order they fill two cores best: the first with both short ones on one, the others on the other."""
+"""The order that fills two cores best: the first paper and both short ones on one core, the others on the other."""
 
 
 class Done(NamedTuple):
-    """A paper's program after its end: its exit `code`, what it printed, the numbers it wrote, and the time it took (s)."""
+    """A paper's program after its end: its exit `code`, its printed output, its numbers, and the time that it took (s)."""
 
     code: int
     printed: str
@@ -36,12 +36,15 @@ class Done(NamedTuple):
 
 
 OF_EACH = ("--out", "--store")
-"""Options whose folder has one of its name for each paper."""
+"""Options whose folder gets a subfolder for each paper."""
 
 
 def all_papers(asked: Mapping[str, Mapping[str, Any]], numbers: Path | None, *, at_once: int | None = None) -> None:
-    """Run each paper with the options `asked` of it, so many `at_once` (None: as there are cores), show what they print in the
-    mapping's order, and write all numbers as one file. Exits with 1 where one of them failed, after the others."""
+    """Run each paper with its options in `asked`, print the outputs in that order, and write all numbers to one file.
+
+    `at_once`: number of papers that run at the same time; None: the number of cores. If one fails, the others are finished, and
+    the program exits with 1.
+    """
     order = sorted(asked, key=lambda name: SLOWEST.index(name) if name in SLOWEST else -1)
     with ends_in_order(), progress("reproduce") as report, tempfile.TemporaryDirectory() as folder:
         finished: list[str] = []
@@ -65,7 +68,7 @@ def all_papers(asked: Mapping[str, Mapping[str, Any]], numbers: Path | None, *, 
         typer.echo(one.printed, nl=False)
     table(
         "Papers",
-        ("paper", "criteria that hold", "took, s"),
+        ("paper", "criteria that hold", "time, s"),
         [(n, _tally(one), f"{one.took:.0f}") for n, one in done.items()],
     )
     if numbers is not None:
@@ -76,7 +79,7 @@ def all_papers(asked: Mapping[str, Mapping[str, Any]], numbers: Path | None, *, 
         results().print(f"numbers: {numbers}")
     failed = [name for name, one in done.items() if one.code != 0]
     if failed:
-        messages().print(f"error: {', '.join(failed)} failed; run each by itself to see why.")
+        messages().print(f"error: {', '.join(failed)} failed; run each alone to see why.")
         raise typer.Exit(1)
 
 
@@ -89,8 +92,10 @@ def _tally(done: Done) -> str:
 
 
 def run_program(name: str, asked: Mapping[str, Any], folder: Path, tell: Callable[[str], None], family: Family) -> Done:
-    """Run `jaxveh reproduce NAME` to its end; each line of its progress is told. Figures and stores go to a folder of the paper's
-    name."""
+    """Run `jaxveh reproduce NAME` to its end, and pass each line of its progress to `tell`.
+
+    Figures and stores go to a folder with the paper's name.
+    """
     start, file = time.perf_counter(), folder / f"{name}.json"
     arguments = [sys.executable, "-m", "jaxveh", "reproduce", name, "--json", str(file)]
     for option, value in asked.items():
@@ -98,7 +103,7 @@ def run_program(name: str, asked: Mapping[str, Any], folder: Path, tell: Callabl
         if value is not None:
             arguments += [option] if value is True else [option, str(value)]
     with tempfile.TemporaryFile("w+") as printed:
-        # One device a program: the cores are shared out already.
+        # One device per program: the programs already use all cores.
         with family.child(arguments, printed, JAX_NUM_CPU_DEVICES="1") as running:
             assert running.stderr is not None
             for line in running.stderr:

@@ -27,10 +27,10 @@ from jaxveh.cli.tyre_fit import fit_table
 HELP = """Estimate what a car cannot measure: sideslip and tyre parameters from steer, speed, acceleration and yaw rate.
 
 Units are SI and radians unless an option says otherwise; axes are x forward, y left, z up; steer, yaw and yaw rate are
-positive to the left. Times are the log's own.
+positive to the left. Times are in the time of the log.
 
---out DIR is the report (figures), -o FILE the product, --json FILE every number shown, with a manifest. Exit codes:
-0 done, 1 a filter or a fit failed, 2 bad input.
+--out DIR is the folder for figures, -o FILE the output file; --json FILE takes every number shown, with a manifest. Exit
+codes: 0 done, 1 a filter or a fit failed, 2 bad input.
 
 Start with: jaxveh demo
 """
@@ -46,11 +46,11 @@ app = typer.Typer(
 
 tyre = typer.Typer(help="Tyres: property files (.tir), and fits to rig data.", no_args_is_help=True)
 
-cache = typer.Typer(help="Compiled programs, kept from one start to the next.", no_args_is_help=True)
+cache = typer.Typer(help="The cache of compiled programs, kept between starts.", no_args_is_help=True)
 
 sweep = typer.Typer(
     cls=RunUnlessNamed, no_args_is_help=True,
-    help="Studies over many runs: STUDY.toml -o STORE.zarr (or run STUDY.toml ...) computes them, show STORE.zarr tells them.",
+    help="Studies over many runs: STUDY.toml -o STORE.zarr (or run STUDY.toml ...) computes one, show STORE.zarr shows it.",
 )  # fmt: skip
 
 
@@ -66,7 +66,7 @@ def options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Options before the command."""
+    """Take the options that stand before the command."""
 
 
 options.__doc__ = join_lines(HELP)

@@ -1,4 +1,4 @@
-"""What an estimator may see of a log: cut out before it is handed over, so that nothing else can reach it."""
+"""The part of a log that an estimator may use: it is cut out beforehand, so that no other channel can reach the estimator."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from jaxveh._core.names import check_names
 from jaxveh.estimators import sideslip
 
 SEEN = (*(need.channel for need in sideslip.needs), "steer")
-"""Channels that the estimator sees; of the steer a fit alone makes use, for the front axle."""
+"""Channels that the estimator may use; only a fit of the front axle uses the steer."""
 
 NEEDED = tuple(need.channel for need in sideslip.needs if not need.optional)
-"""Those without which there is no estimate."""
+"""Channels without which there is no estimate."""
 
 INPUTS = tuple(need.channel for need in sideslip.needs if need.throughout)
-"""Those that must be known in every row."""
+"""Channels that must be finite in every row."""
 
 
 def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
-    """The inputs without gaps: filled along lines over at most `max_gap` seconds where that is given.
+    """Fill gaps in the inputs by linear interpolation over at most `max_gap` seconds, if that is given.
 
-    **Raises** `InputError` where a channel of `NEEDED` is missing, or an input is still NaN, and the option for it.
+    **Raises** `InputError`, with the option that helps, if a channel of `NEEDED` is missing, or an input is still NaN.
     """
     if max_gap is not None:
         check_positive("--fill", max_gap, "s")
     missing = [name for name in NEEDED if name not in recording]
     if missing:
         raise InputError(
-            f"the log has no {', '.join(missing)}; it must have {', '.join(NEEDED)}. Say which columns they are with "
+            f"the log has no {', '.join(missing)}; it must have {', '.join(NEEDED)}. Map their columns with "
             "--channels (jaxveh schema channels)."
         )
     for name in (*INPUTS, *(("steer",) if "steer" in recording else ())):
@@ -43,14 +43,14 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
             first = np.asarray(recording.time)[np.argmax(gaps)]
             advice = "add --fill SECONDS" if max_gap is None else "raise --fill, or take a span without the gap"
             raise InputError(
-                f"input channel {name} is NaN in {int(gaps.sum())} rows, first at t = {first:g} s: an input must be known; "
+                f"input channel {name} is NaN in {int(gaps.sum())} rows, first at t = {first:g} s: inputs must be finite; "
                 f"{advice}."
             )
     return recording
 
 
 class LogParts(NamedTuple):
-    """A log in parts: the `calibration` span (or None), the rows to `estimate`, and all channels of those as `truth`."""
+    """The parts of a log: the `calibration` span (or None), the rows to `estimate`, and as `truth` all channels of those rows."""
 
     calibration: Recording | None
     estimate: Recording
@@ -60,11 +60,11 @@ class LogParts(NamedTuple):
 def split(
     recording: Recording, span: tuple[float, float] | None, calibrate_on: Sequence[str] = (), truth: str | None = None
 ) -> LogParts:
-    """Cut a log: the span with the blind channels and `calibrate_on`; the rows after it with the blind channels alone.
+    """Cut a log into the span, with the channels of `SEEN` and `calibrate_on`, and the rows after it, with those of `SEEN` alone.
 
-    A channel named as `truth` is NaN wherever an estimator could see it, but for `calibrate_on` inside the span.
+    The channel named as `truth` is NaN wherever an estimator could see it, except as `calibrate_on` inside the span.
 
-    **Raises** `InputError` for unknown channels, channels to calibrate on without a span, or nothing after the span.
+    **Raises** `InputError` for unknown channels, channels to calibrate on without a span, or no rows after the span.
     """
     check_names("--calibrate-on", calibrate_on, recording.names)
     if truth is not None:
@@ -85,7 +85,7 @@ def split(
 
 
 def calibration_part(recording: Recording, calibrate_on: Sequence[str]) -> Recording:
-    """The log with the blind channels and `calibrate_on`."""
+    """Return the log with the channels of `SEEN` and of `calibrate_on`."""
     check_names("--calibrate-on", calibrate_on, recording.names)
     return _visible_channels(recording, tuple(calibrate_on), None)
 

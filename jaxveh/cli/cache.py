@@ -1,4 +1,4 @@
-"""`jaxveh cache`: what programs have kept compiled."""
+"""`jaxveh cache`: the compiled programs that earlier starts have kept."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ MEGABYTE = 1e6
 
 
 def show() -> None:
-    """Print where compiled programs are kept, how many and how large.
+    """Print the folders of the compiled programs, with number and size.
 
-    A second start reads them instead of compiling. JAXVEH_CACHE=off in the environment keeps none, JAXVEH_CACHE=FOLDER keeps them
-    there; where JAX_COMPILATION_CACHE_DIR is set, jax keeps them there by its own rules.
+    A later start reads them instead of compiling. In the environment, JAXVEH_CACHE=off keeps none, JAXVEH_CACHE=FOLDER keeps them
+    in that folder; if JAX_COMPILATION_CACHE_DIR is set, jax keeps them there by its own rules.
     """
     for one in _folders():
         results().print(f"{one}: {_said(one)}", markup=False, soft_wrap=True)
 
 
 def clear() -> None:
-    """Delete the compiled programs of all versions; the next start compiles anew."""
+    """Delete the compiled programs of all versions; the next start compiles again."""
     for one in _folders():
         results().print(f"deleted {one}: {_said(one)}", markup=False, soft_wrap=True)
         shutil.rmtree(one)

@@ -1,4 +1,4 @@
-"""`jaxveh check`: what a log says about itself before anyone trusts it."""
+"""`jaxveh check`: checks of a log before its data are used."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ def check(
     vehicle: Annotated[
         Path | None,
         typer.Option(
-            "--vehicle", metavar="CAR.toml", help="The car: adds the checks that need one (steering offset, signs)."
+            "--vehicle", metavar="CAR.toml", help="The car; adds the checks that need a car (steering offset, signs)."
         ),
     ] = None,
     channels: options.Channels = None,
     out: options.Out = None,
     numbers: options.Numbers = None,
 ) -> None:
-    """Look at a log: signs, units, gaps, delays between channels, steering offset, plausibility, in words.
+    """Check a log: signs, units, gaps, delays between channels, steering offset, plausibility.
 
-    Nothing is changed and nothing is fitted. The exit code is 0 whatever is found: read the lines.
+    The findings are printed in words. Nothing is changed and nothing is fitted. The exit code is 0 even if errors are found.
 
     Example: [bold]jaxveh check drive.csv --vehicle car.toml --out check[/]
     """

@@ -1,4 +1,4 @@
-"""What a person sees: tables on stdout, progress and messages on stderr."""
+"""Output for the terminal: tables on stdout, progress and messages on stderr."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from jaxveh._core.progress import Progress as Report
 
 
 def messages() -> Console:
-    """stderr; made anew each time, so that a redirected stream is seen."""
+    """Return a console on stderr; it is made anew each time, so that a redirected stream is used."""
     return Console(stderr=True, emoji=False, highlight=False)
 
 
 WIDE = 160
-"""Columns of a file or a pipe, which nobody can widen: tables keep their numbers on one line there."""
+"""Width, in characters, of a file or a pipe: wide enough to keep the numbers of a table row on one line."""
 
 
 def results() -> Console:
-    """stdout."""
+    """Return a console on stdout."""
     console = Console(emoji=False, highlight=False)
     return console if console.is_terminal else Console(emoji=False, highlight=False, width=WIDE)
 
 
 @contextlib.contextmanager
 def progress(title: str) -> Iterator[Report]:
-    """A callable `(done, total, stage)` that moves a bar on a terminal, or prints each new stage as a line elsewhere."""
+    """Yield a callable `(done, total, stage)` that moves a bar on a terminal, and elsewhere prints each new stage as a line."""
     console = messages()
     if not console.is_terminal:
         yield _lines(console, title)
@@ -53,7 +53,7 @@ def _lines(console: Console, title: str) -> Report:
     seen: list[str] = []
 
     def report(done: float, total: float, stage: str) -> None:
-        # Steps that only count up would fill a log file.
+        # Stages that differ only in a count would fill a log file.
         kind = re.sub(r"[\d.]+", "#", stage)
         if stage and kind not in seen:
             seen.append(kind)
@@ -63,13 +63,15 @@ def _lines(console: Console, title: str) -> Report:
 
 
 def printable(text: str) -> str:
-    """The text with a question mark for each byte that was no text when it was read, which no terminal takes."""
+    """Return the text with a question mark for each byte that could not be decoded, which a terminal would refuse."""
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], note: str = "", left: int = 1) -> None:
-    """Print a table: the first `left` columns to the left, numbers to the right; a cell that is no string is shown by
-    `number`."""
+    """Print a table: the first `left` columns aligned to the left, the others to the right.
+
+    A cell that is not a string is formatted by `number`.
+    """
     shown = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     for i, column in enumerate(columns):
         shown.add_column(Text(column), justify="left" if i < left else "right")
@@ -84,7 +86,7 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], 
 
 
 def number(value: object, digits: int = 4) -> str:
-    """A number with its significant digits; a dash for what is not there."""
+    """Format a number with `digits` significant digits; a dash for None and NaN."""
     if value is None:
         return "-"
     value = float(value)  # type: ignore[arg-type]
@@ -94,12 +96,12 @@ def number(value: object, digits: int = 4) -> str:
 
 
 def spread(mean: object, std: object, between: str = " ") -> str:
-    """`mean ± std` with as many decimals as the spread calls for."""
+    """Format `mean ± std` with the number of decimals that the standard deviation justifies."""
     mean, std = float(mean), float(std)  # type: ignore[arg-type]
     if not 0 < std < float("inf"):
         return number(mean)
     if std < 1e-4 * abs(mean):
-        # Particles that have all become one: decimals that fit the spread would fill the line.
+        # All particles have collapsed into one: decimals that fit the standard deviation would fill the line.
         return f"{number(mean)}{between}± {std:.0e}"
     decimals = max(0, 1 - int(f"{std:e}".partition("e")[2]))
     return f"{mean:.{decimals}f}{between}± {std:.{decimals}f}"

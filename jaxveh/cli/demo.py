@@ -1,4 +1,4 @@
-"""`jaxveh demo`: a double lane change, four estimators side by side, in about a minute."""
+"""`jaxveh demo`: four estimators side by side on a double lane change, in about a minute."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.output import check_report, make_folder, write_numbers
 from jaxveh.experiments import tyre_apf
 
-COUNT = typer.Option("--seeds", help="Drives, each with its own noise and prior; tables show medians.", min=1)
-OUT = typer.Option("--out", metavar="DIR", help="The figures' folder.")
-PARTICLES = typer.Option("--particles", help="Of both particle filters, at least 2.")
+COUNT = typer.Option("--seeds", help="Number of drives, each with its own noise and prior; tables show medians.", min=1)
+OUT = typer.Option("--out", metavar="DIR", help="The folder for the figures.")
+PARTICLES = typer.Option("--particles", help="Number of particles of both particle filters, at least 2.")
 
 
 def demo(
@@ -32,9 +32,10 @@ def demo(
 ) -> None:
     """Estimate tyre parameters from a simulated double lane change, with four estimators side by side.
 
-    A car drives 7 degrees of steer at the road wheels at 25 m/s; a yaw-rate sensor and a lateral accelerometer are noisy. Each
-    estimator starts from a prior that is about 10 % wrong in every tyre parameter: a particle filter (PF), an auxiliary
-    particle filter (APF), an unscented Kalman filter (UKF) and a fit (MAP). About a minute on two cores, compiling included.
+    A car drives at 25 m/s with 7 degrees of steer at the road wheels; a yaw-rate sensor and a lateral accelerometer are noisy.
+    Each estimator starts from a prior that is about 10 % wrong in every tyre parameter: a particle filter (PF), an auxiliary
+    particle filter (APF), an unscented Kalman filter (UKF) and a fit (MAP). It takes about a minute on two cores, including
+    compilation.
 
     Example: [bold]jaxveh demo --seeds 20 --json demo.json[/]
     """
@@ -50,7 +51,7 @@ def demo(
     for path in paths:
         results().print(f"figure: {path}")
     took = time.perf_counter() - start
-    results().print(f"in all {took:.0f} s, compiling included")
+    results().print(f"{took:.0f} s in all, including compilation")
     configuration = {"seeds": seeds, "study": dataclasses.asdict(study)}
     write_numbers(numbers, {**_numbers(found), "total_s": took, "figures": paths}, configuration, seed)
 
@@ -77,7 +78,7 @@ def _print(found: tyre_apf.Staged, study: tyre_apf.Study, seeds: int) -> None:
     _print_parameters(found, study, seeds)
     _print_errors(found)
     _print_seconds(found)
-    results().print("[bold]What the drive can tell of the eight parameters at all[/]")
+    results().print("[bold]Observability of the eight parameters on this drive[/]")
     results().print(found.observability.report(), markup=False)
     results().print()
     _print_failures(found)
@@ -111,7 +112,7 @@ def _print_errors(found: tyre_apf.Staged) -> None:
         )
     heads = ("front\n%", "rear\n%", "v_y\nm/s", "yaw rate\nrad/s", *[f"step {d}°\nrad/s" for d in found.steps])
     table(
-        "RMSE: axle force over the visited slips in % of D; states; yaw rate in a step steer",
+        "RMSE: axle force over the visited slip angles in % of D; states; yaw rate in a step steer",
         ("estimator", *heads),
         rows,
         "prior and MAP states: open loop, from steer and speed alone",

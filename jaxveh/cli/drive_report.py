@@ -1,4 +1,4 @@
-"""What `simulate` shows of a drive: numbers of standards, and figures."""
+"""The results of `simulate` for a drive: numbers of standards, and figures."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from jaxveh.manoeuvres import clearance, understeer_of
 from jaxveh.vehicles import GRAVITY
 
 BODY = 4.5
-"""m: length of the car between cones, assumed; its width is the one that the course was made for."""
+"""Assumed length of the car between the cones, m; its width is the one for which the course was made."""
 
 SPEED = 80 / 3.6
-"""m/s: at which FMVSS 126 takes the steer at 0.3 g."""
+"""Speed at which FMVSS 126 defines the steer at 0.3 g, m/s."""
 
 
 def wheelbase_of(car: Any) -> float | None:
-    """Between the axles, m; None for a car without."""
+    """Return the wheelbase, m; None for a car that has none."""
     if not (hasattr(car, "front_axle_to_cg") and hasattr(car, "rear_axle_to_cg")):
         return None
     return float(car.front_axle_to_cg) + float(car.rear_axle_to_cg)
 
 
 def steer_at_03g(car: Any) -> float | None:
-    """Steer of the car with its tyres' slopes in a steady turn at 0.3 g and `SPEED`, rad; None for a car that has none."""
+    """Return the steer in a steady turn at 0.3 g and `SPEED` with linear tyres, rad; None for a car that has none."""
     wheelbase, gradient = wheelbase_of(car), understeer_of(car)
     if wheelbase is None or gradient is None:
         return None
@@ -40,12 +40,15 @@ def steer_at_03g(car: Any) -> float | None:
 
 
 def _reference_steer(asked: AskedManoeuvre, car: Any) -> float | None:
-    """The steer at 0.3 g where the manoeuvre's steer is counted in it."""
+    """Return the steer at 0.3 g if the manoeuvre's steer is a multiple of it; otherwise None."""
     return steer_at_03g(car) if asked.name == "sine-with-dwell" else None
 
 
 def numbers_of(recording: Recording, asked: AskedManoeuvre, car: Any) -> dict[str, dict[str, Any]]:
-    """Numbers by title and name, SI; where the drive does not carry its standard's, the peaks alone and a warning why."""
+    """Return numbers by title and name, in SI units.
+
+    If the drive does not allow the numbers of its standard, there are only the peaks, and a warning with the reason.
+    """
     try:
         found = diagnostics.drive_numbers(
             recording, asked.name, wheelbase_of(car), steer_at_03g=_reference_steer(asked, car)
@@ -64,7 +67,7 @@ def numbers_of(recording: Recording, asked: AskedManoeuvre, car: Any) -> dict[st
 
 
 def print_numbers(found: dict[str, dict[str, Any]]) -> None:
-    """A line a title, without what is not known."""
+    """Print one line per title, without the unknown numbers."""
     results().print("In SI units (s, m, m/s, m/s^2, rad, N):")
     for title, values in found.items():
         words = [f"{name} {_word(value)}" for name, value in values.items() if not _is_missing(value)]
@@ -94,7 +97,7 @@ def draw(recording: Recording, asked: AskedManoeuvre, car: Any, out: Path) -> li
             recording, asked.name, course=course, car=car, steer_at_03g=_reference_steer(asked, car)
         )
     except InputError as error:
-        say("warning", "yellow", f"no figure of {asked.name}, what the car does instead: {error}")
+        say("warning", "yellow", f"no figure of {asked.name}; an overview of the drive is drawn instead: {error}")
         figures["drive"] = plots.overview(recording)
     if drive_channels.has(recording, "x", "y", "yaw"):
         figures["top_view"] = plots.top_view(recording, course, car=car)

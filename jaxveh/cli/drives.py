@@ -1,4 +1,4 @@
-"""Logs as the programs of sideslip take them: read, cut to a span, looked at before anything is made of them."""
+"""Logs for the programs of sideslip: read, cut to a span, and checked before they are used."""
 
 from __future__ import annotations
 
@@ -18,15 +18,18 @@ COLOURS = {"error": "bold red", "warning": "yellow", "note": "cyan", "ok": "gree
 
 
 BRIDGED = 0.1
-"""s."""
+"""Longest gap that resampling fills, s."""
 
 UNLIKE, SURE = 1.25, 0.8
-"""Steers that are so many times as large against what one car needs, each with this correlation, are not of one car. Quarters of
-one log differ by up to 1.17 (three real logs), logs of different cars by 1.1 to 1.5: not all of them are told apart."""
+"""Ratio of two logs' steer scales, and least correlation of each scale, above which the logs are taken for two cars'.
+
+A steer scale is the measured steer over the steer that the car of the file needs. Quarters of one log differ by up to 1.17 (three
+real logs), logs of different cars by 1.1 to 1.5: some logs of different cars are not recognised.
+"""
 
 
 class Drive(NamedTuple):
-    """A log's file, what of it is taken, and what `check` says of that."""
+    """A log's file, the part of it that is used, and the findings of `check` about that part."""
 
     log: Path
     recording: Recording
@@ -42,10 +45,10 @@ def read_drives(
     used: tuple[str | None, ...],
     anyway: bool,
 ) -> list[Drive]:
-    """The logs, each cut to its span, with gaps of inputs filled on request, after `check` has looked at it.
+    """Read the logs, cut each to its span, fill gaps of inputs on request, and check each.
 
-    What `check` warns of is printed. **Raises** `InputError` where it finds errors in channels that are `used`, or seen by an
-    estimator, unless it goes on `anyway`.
+    The warnings of `check` are printed. **Raises** `InputError` if it finds errors in channels that are `used`, or that an
+    estimator uses, unless `anyway` is set.
     """
     drives = []
     for log in logs:
@@ -65,9 +68,9 @@ def read_log(
     used: tuple[str | None, ...],
     anyway: bool,
 ) -> Drive:
-    """One log, cut to its span, after `check` has looked at it; nothing in it is needed but what is `used`.
+    """Read one log, cut it to its span, and check it; it needs no channels except those that are `used`.
 
-    **Raises** `InputError` where `check` finds errors in the time or what is used, unless it goes on `anyway`.
+    **Raises** `InputError` if `check` finds errors in the time or in a used channel, unless `anyway` is set.
     """
     recording = _read(log, car, channels, span)
     return Drive(log, recording, _look_at(log, recording, car, {"time", *(name for name in used if name)}, anyway))
@@ -83,19 +86,19 @@ def _read(log: Path, car: CarSpecification, channels: Path | None, span: str | N
 
 
 def _on_one_clock(log: Path, recording: Recording) -> Recording:
-    """The log at the rows of its yaw rate, where that and a_y never share one; said, not silent."""
+    """Resample the log at the rows of its yaw rate, with a note, if yaw rate and a_y are never measured in the same row."""
     if not estimators.sideslip.speak_apart(recording):
         return recording
     words = (
-        f"note: {log.name}: a_y and yaw_rate have clocks of their own: all channels are taken at the rows of yaw_rate, along "
-        f"lines over at most {BRIDGED:g} s."
+        f"note: {log.name}: a_y and yaw_rate have separate clocks: all channels are interpolated linearly at the rows of "
+        f"yaw_rate, over at most {BRIDGED:g} s."
     )
     results().print(words, markup=False, soft_wrap=True)
     return io.resample(recording, "yaw_rate", max_gap=BRIDGED)
 
 
 def _check_one_car(drives: Sequence[Drive]) -> None:
-    """Raise `InputError` where logs look like those of different cars, by what each steer is of what the car needs."""
+    """Raise `InputError` if logs look like those of different cars: measured steer over needed steer differs between them."""
     scales = {}
     for drive in drives:
         for finding in drive.findings:
@@ -106,8 +109,9 @@ def _check_one_car(drives: Sequence[Drive]) -> None:
     small, large = min(scales, key=lambda log: scales[log]), max(scales, key=lambda log: scales[log])
     if scales[large] > UNLIKE * scales[small]:
         raise InputError(
-            f"{large}: looks like a log of another car than {small}: in gentle turns its steer is {scales[large]:.2f} times what "
-            f"the car of the file needs, there {scales[small]:.2f}. Take logs of one car; --anyway goes on."
+            f"{large}: looks like a log of another car than {small}: in gentle turns its steer is {scales[large]:.2f} times the "
+            f"steer that the car of the file needs, in the other {scales[small]:.2f} times. Use logs of one car; --anyway "
+            "continues."
         )
 
 
@@ -126,6 +130,6 @@ def _look_at(
         first = errors[0]
         more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
         raise InputError(
-            f"{log}: {first.channel} {first.message}{more} `jaxveh check` tells all; --anyway goes on with the log as it is."
+            f"{log}: {first.channel} {first.message}{more} `jaxveh check` shows all findings; --anyway uses the log unchanged."
         )
     return findings

@@ -1,4 +1,4 @@
-"""`jaxveh estimate`: states of a car along its logs, with standard deviations, and a score where there is a truth."""
+"""`jaxveh estimate`: states of a car along its logs, with standard deviations, and a score if there is a truth."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MCAP_SUFFIX = io.kit.MCAP_SUFFIX
 
 
 class Filter(StrEnum):
-    """Which filter."""
+    """The filter."""
 
     ekf = "ekf"
     ukf = "ukf"
@@ -38,41 +38,41 @@ PRODUCT = typer.Option(
     metavar="FILE",
     show_default=False,
     help="Time series with standard deviations: .parquet, .csv, .nc, .mf4 or .mdf; or .mcap, with the log's channels and "
-    "the truth as topics of their own, for Foxglove and PlotJuggler. Of several logs a folder, with a .parquet each.",
+    "the truth as separate topics, for Foxglove and PlotJuggler. For several logs: a folder, with one .parquet per log.",
 )
 VEHICLE = typer.Option(
     "--vehicle",
     metavar="CAR.toml",
-    help="The car (jaxveh schema car); a --calibration brings its own.",
+    help="The car (jaxveh schema car); not needed with --calibration, whose file contains the car.",
     show_default=False,
 )
 CALIBRATION = typer.Option(
     "--calibration",
     metavar="FILE",
-    help="Estimate with this calibration, which `jaxveh fit` has written.",
+    help="Estimate with this calibration file, written by `jaxveh fit`.",
     show_default=False,
 )
 TRUTH = typer.Option(
     "--truth",
     metavar="CHANNEL",
-    help="Score against this channel (v_y or sideslip; true.v_y of a simulation), which no estimator gets to see (but see "
-    "--calibrate-on).",
+    help="Score the estimate against this channel (v_y or sideslip; true.v_y of a simulation). It is hidden from the estimator, "
+    "except for --calibrate-on.",
 )
 REPORT = typer.Option(
     "--report",
     metavar="FILE.html",
-    help="Write one page that opens without a network: check, fit, scores, and charts to zoom into. --force replaces it.",
+    help="Write one page that opens without a network: check, fit, scores, and zoomable charts. --force replaces an old one.",
     show_default=False,
 )
 FILTER = typer.Option(
     "--filter", help="Extended or unscented Kalman (smoothed), auxiliary or bootstrap particle filter."
 )
-AS_TOLD = typer.Option("--as-told", help="Take the car file at its word: nothing is fitted.")
-PARTICLES = typer.Option("--particles", help="Of a particle filter, at least 2.")
+AS_TOLD = typer.Option("--as-told", help="Use the values of the car file; nothing is fitted.")
+PARTICLES = typer.Option("--particles", help="Number of particles of a particle filter, at least 2.")
 
 
 class Job(NamedTuple):
-    """One log: its parts, the span that it is calibrated on, where the estimate goes, and the folder of its figures."""
+    """One log: its parts, the span for its calibration, the file of its estimate, and the folder of its figures."""
 
     drive: Drive
     parts: LogParts
@@ -107,12 +107,12 @@ def estimate(
 ) -> None:
     """Estimate what a car cannot measure along its logs: sideslip, slip and forces, or another quantity (--what).
 
-    A log calibrates itself: the rear axle, noises and sensor offsets are fitted on all its rows, of which no reference is seen,
-    and all rows are estimated; several logs of a car calibrate themselves together. With --calibrate they are fitted on that span
-    first, and the rows after it are estimated; --calibration takes what jaxveh fit has written, --as-told the car file at its
-    word. The file has a column for each state and, beside it, <name>_std, its standard deviation: m/s, rad, rad/s.
+    By default a log calibrates itself: the rear axle, noises and sensor offsets are fitted on all its rows, without a reference,
+    and then all rows are estimated; several logs of a car are calibrated together. With --calibrate the fit uses that span, and
+    the rows after it are estimated; --calibration uses a file that jaxveh fit has written; --as-told uses the values of the car
+    file. The output file has a column for each state and, beside it, <name>_std, its standard deviation: m/s, rad, rad/s.
 
-    Before all this the log is checked, as by jaxveh check; errors stop here (--anyway goes on).
+    First of all the log is checked, as by jaxveh check; the program ends if there are errors (--anyway continues).
 
     The car file is TOML in SI units with mass, yaw_inertia, front_axle_to_cg, rear_axle_to_cg and, for each axle, its
     cornering stiffness or Magic Formula coefficients: see [bold]jaxveh schema car[/].
@@ -175,7 +175,7 @@ class Choice(NamedTuple):
 
 
 def _estimate(choice: Choice) -> tuple[Any, dict[str, Any]]:
-    """The calibration, None for a car at its word, and what became of each log, by its name."""
+    """Return the calibration (None if the values of the car file are used), and the numbers of each log by its name."""
     products = _check(choice)
     told = None if choice.vehicle is None else io.read_car(choice.vehicle)
     found = None if choice.calibration is None else sideslip.read_calibration(choice.calibration, told)
@@ -204,7 +204,7 @@ def _estimate(choice: Choice) -> tuple[Any, dict[str, Any]]:
 
 
 def _check(choice: Choice) -> list[Path]:
-    """Raise where options contradict each other or a file could not be written; the files of the estimates."""
+    """Return the files of the estimates; raise `InputError` if options conflict, or a file could not be written."""
     logs, product = choice.logs, choice.product
     sources = (*logs, choice.vehicle, choice.channels, choice.calibration)
     if len(logs) == 1:
@@ -220,23 +220,23 @@ def _check(choice: Choice) -> list[Path]:
     if choice.truth is not None:
         check_one_of("--truth", choice.truth, (*sideslip.SCORED, *(f"{SIMULATED}{name}" for name in sideslip.SCORED)))
     if choice.as_told and choice.calibrate is not None:
-        raise InputError("--as-told fits nothing: leave --calibrate out, or --as-told.")
+        raise InputError("--as-told fits nothing: leave out --calibrate or --as-told.")
     if choice.calibration is not None and (choice.as_told or choice.calibrate is not None):
         other = "--as-told" if choice.as_told else "--calibrate"
-        raise InputError(f"--calibration says it all: leave {other} out, or --calibration.")
+        raise InputError(f"--calibration contains all fitted values: leave out {other} or --calibration.")
     if choice.calibrate is not None and len(logs) > 1:
-        raise InputError("--calibrate is of one log: calibrate with `jaxveh fit`, and give its file as --calibration.")
+        raise InputError("--calibrate takes one log: calibrate with `jaxveh fit`, and give its file as --calibration.")
     return products
 
 
 def _with_simulated_truth(choice: Choice, drives: Sequence[Drive]) -> tuple[Choice, list[Drive]]:
-    """Of a simulated log `true.v_y` is scored as a measured v_y would be, in whose place it stands."""
+    """In a simulated log put `true.v_y` in the place of a measured v_y, so that it is scored in the same way."""
     if choice.truth is None or not choice.truth.startswith(SIMULATED):
         return choice, list(drives)
     name = choice.truth.removeprefix(SIMULATED)
     if name in choice.calibrate_on:
         raise InputError(
-            f"--truth {choice.truth}: calibrated on {name}, too: take --truth {name}, or leave --calibrate-on out."
+            f"--truth {choice.truth}: --calibrate-on uses {name}: take --truth {name}, or leave --calibrate-on out."
         )
     logs = [drive.recording.replace(**{name: drive.recording[choice.truth]}) for drive in drives]
     return choice._replace(truth=name), [one._replace(recording=log) for one, log in zip(drives, logs, strict=True)]
@@ -246,7 +246,7 @@ def _job(choice: Choice, drive: Drive, product: Path) -> Job:
     time = drive.recording.time
     if product.suffix.lower() == MCAP_SUFFIX and time[0] < 0:
         raise InputError(
-            f"-o {product}: stamps must be at least zero, the log begins at {time[0]:g} s: write another format."
+            f"-o {product}: time stamps must be at least zero, but the log begins at {time[0]:g} s: write another format."
         )
     span = options.span_of(choice.calibrate, float(time[0]), float(time[-1]))
     parts = split(drive.recording, span, choice.calibrate_on, choice.truth)
@@ -285,7 +285,7 @@ def _say_source(choice: Choice, calibration: Any, reason: str | None) -> None:
 
 def _source_in_words(choice: Choice, calibration: Any, reason: str | None) -> str:
     if calibration is None:
-        return f"Nothing was calibrated, the car file is taken at its word: {reason}."
+        return f"Nothing was calibrated, the values of the car file are used: {reason}."
     spans = "; ".join(f"{span.log or 'a log'} {span.start:g} to {span.end:g} s" for span in calibration.spans)
     if choice.calibration is not None:
         return f"Calibrated by {choice.calibration}, on {spans}."
@@ -296,13 +296,13 @@ def _source_in_words(choice: Choice, calibration: Any, reason: str | None) -> st
 
 
 def _conclude(choice: Choice, job: Job, found: Any, calibration: Any, car: io.CarSpecification) -> dict[str, Any]:
-    """Write one estimate, print its score, draw its figures: its numbers for the JSON file."""
+    """Write one estimate, print its score and draw its figures; return its numbers for the JSON file."""
     score = None if choice.truth is None else sideslip.score(car, found, job.parts.truth, choice.truth)
     _write(choice, job, found, car)
     if score is not None:
         rows = [(name, f"{value}" if isinstance(value, int) else number(value)) for name, value in score.items()]
-        title = f"Score over the rows estimated of {job.drive.log.name}, by the names of the JSON file"
-        table(title, ("what", "value"), rows)
+        title = f"Score over the estimated rows of {job.drive.log.name}, by the names of the JSON file"
+        table(title, ("name", "value"), rows)
     time = np.asarray(found.time)
     results().print(f"{job.product}: {time.size} rows from {time[0]:g} to {time[-1]:g} s", markup=False)
     figures = []
@@ -313,7 +313,7 @@ def _conclude(choice: Choice, job: Job, found: Any, calibration: Any, car: io.Ca
 
 
 def _write(choice: Choice, job: Job, found: Any, car: io.CarSpecification) -> None:
-    """Write the estimate; into topics with what it was made of."""
+    """Write the estimate; an MCAP file also gets the log and the truth as topics."""
     if job.product.suffix.lower() != MCAP_SUFFIX:
         io.write_frame(io.to_frame(found), job.product, overwrite=choice.force)
         return

@@ -18,7 +18,7 @@ OPEN_LOOP = "open-loop linear model"
 
 
 def beside(car: CarSpecification, seen: Recording, truth: str | None) -> tuple[Any, Mapping[str, Any]]:
-    """The truth by name (None without), and what is drawn beside it: the baseline, where there are a truth and a steer."""
+    """Return the truth by name (None if there is none), and the curves beside it: the baseline, if there are truth and steer."""
     if truth is None:
         return None, {}
     steered = "steer" in seen and np.isfinite(np.asarray(seen["steer"])).any()
@@ -35,10 +35,10 @@ def draw(
     span: tuple[float, float] | None,
     out: Path,
 ) -> list[Path]:
-    """Draw into the folder `out`, and say what: the log's channels, the estimate, its worst part, its innovations, the rear axle.
+    """Draw figures into the folder `out` and print their names: channels, estimate, its worst part, innovations, rear axle.
 
-    `found`: the estimate of the rows of `seen`; `recording` has those of the `span` (s) that was calibrated on, too;
-    `calibration`: None for a car at its word.
+    `found`: the estimate of the rows of `seen`; `recording`: the whole log, with the calibration `span` (s) too;
+    `calibration`: None if the values of the car file are used.
     """
     from jaxveh import plots
 
@@ -60,6 +60,6 @@ def draw(
         try:
             paths.append(plots.save(make(), out / f"{name}.png"))
             results().print(f"figure: {paths[-1]}", markup=False)
-        except InputError as error:  # a log may have no row for one of them
+        except InputError as error:  # a log may have no row for one of the figures
             results().print(f"no figure {name}.png: {error}", markup=False, soft_wrap=True)
     return paths

@@ -27,13 +27,13 @@ WORDS = {
     "coverage_50": "share inside the 50 % band",
     "coverage_95": "share inside the 95 % band",
     "crps": "CRPS",
-    "crps_constant": "CRPS of the same with one constant spread",
+    "crps_constant": "CRPS with a constant standard deviation",
 }
-"""What a `diagnostics.Score` has."""
+"""The fields of a `diagnostics.Score` in words."""
 
 
 def check_report_page(path: Path | None, force: bool, sources: tuple[Path | None, ...]) -> None:
-    """Raise before any work where the page could not be written, or Bokeh is missing."""
+    """Raise `InputError`, before any work, if the page could not be written, or Bokeh is missing."""
     if path is not None:
         check_product(path, (".html",), force, sources, "--report")
         io.kit.require("bokeh", "writing a report", "report")
@@ -43,7 +43,7 @@ def reported_log(
     drive: Drive, found: Any, seen: Recording, truth: str | None, score: Mapping[str, Any] | None,
     car: io.CarSpecification, calibration: Any,
 ) -> Any:  # fmt: skip
-    """A log for the page: its estimate `found` of the rows of `seen`, and its score by the names of the JSON file."""
+    """Return a log for the page, with its estimate `found` of the rows of `seen`, and its score by the names of the JSON file."""
     from jaxveh import plots
 
     true, others = beside(car, seen, truth)
@@ -53,7 +53,7 @@ def reported_log(
         axle = None
     try:
         innovations = plots.innovation_points(found)
-    except InputError:  # a filter without, or nothing measured
+    except InputError:  # the filter has no innovations, or there are no measurements
         innovations = ()
     tables = () if score is None else (score_table(score),)
     return plots.ReportedLog(drive.log.name, found, seen, true, others, axle, innovations, tables)
@@ -70,8 +70,10 @@ def write_report(
     *,
     overwrite: bool = False,
 ) -> None:
-    """Write the page of `logs` (of `reported_log`), all or nothing. `source`: where the calibration is from, in words; `facts`:
-    options by name, None for those that were not given."""
+    """Write the page of `logs` (from `reported_log`), completely or not at all.
+
+    `source`: the origin of the calibration, in words; `facts`: options by name, None for those that were not given.
+    """
     from jaxveh import plots
 
     about = [("logs" if len(drives) > 1 else "log", "; ".join(_log_in_words(drive) for drive in drives))]
@@ -98,14 +100,14 @@ def _car_in_words(car: io.CarSpecification) -> str:
 
 
 def _findings(drive: Drive) -> list[Any]:
-    """What `check` found, the worst first; what is as it should be is folded."""
+    """Return the findings of `check`, the worst first; the checks that passed are folded."""
     from jaxveh import plots
 
     columns = "severity", "channel", "finding"
     worst_first = sorted(drive.findings, key=lambda finding: list(COLOURS).index(finding.severity))
     rows = [(finding.severity, finding.channel, finding.message) for finding in worst_first]
     told, fine = [row for row in rows if row[0] != "ok"], [row for row in rows if row[0] == "ok"]
-    nothing = "" if told else "Nothing to remark."
+    nothing = "" if told else "No findings."
     tables = [plots.ReportTable(f"Check of {drive.log.name}", columns, told, nothing)]
     return [*tables, plots.ReportTable(f"{len(fine)} checks passed", columns, fine, folded=True)] if fine else tables
 
@@ -114,7 +116,9 @@ def _fitted(calibration: Any) -> Any:
     from jaxveh import plots
 
     if calibration is None:
-        return plots.ReportTable("Fitted parameters", (), (), "Nothing was fitted: the car file is taken at its word.")
+        return plots.ReportTable(
+            "Fitted parameters", (), (), "Nothing was fitted: the values of the car file are used."
+        )
     rows = [
         (name, *spread(one["value"], one["std"], "|").replace("± ", "").split("|"), one["unit"])
         for name, one in sideslip.fitted_parameters(calibration)["fitted"].items()
@@ -126,7 +130,7 @@ def _fitted(calibration: Any) -> Any:
 
 
 def score_table(score: Mapping[str, Any]) -> Any:
-    """Errors by the names of the JSON file, in words, beside those of the open-loop linear model."""
+    """Return a table of the errors, from the names of the JSON file, beside those of the open-loop linear model."""
     from jaxveh import plots
 
     rows = [
@@ -135,12 +139,14 @@ def score_table(score: Mapping[str, Any]) -> Any:
         if name.startswith(("sideslip_", "v_y_"))
     ]
     count, floor = score["rows"], score["least_speed"]
-    words = f"Over the {count} rows that have a truth and at least {floor:g} m/s. Bands should hold 50 and 95 %."
+    words = (
+        f"Over the {count} rows that have a truth and at least {floor:g} m/s. Bands should contain 50 and 95 % of them."
+    )
     return plots.ReportTable("Score against the truth", ("", "estimate", "open-loop linear model"), rows, words, (1, 2))
 
 
 def _in_words(name: str) -> str:
-    """`sideslip_rmse_deg` as `sideslip: RMSE [°]`."""
+    """Return `sideslip_rmse_deg` as `sideslip: RMSE [°]`."""
     what = "sideslip" if name.startswith("sideslip_") else "v_y"
     plain = name.removeprefix(f"{what}_").removesuffix("_deg")
     unit = "" if "coverage" in plain else " [°]" if what == "sideslip" else " [m/s]"

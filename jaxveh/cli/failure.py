@@ -1,4 +1,4 @@
-"""One line for what went wrong, and the exit code: 2 for what the user can put right, 1 for what did not converge."""
+"""One line for each failure, and the exit code: 2 for input that the user can correct, 1 for a filter or fit that failed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an e
 
 
 def program(function: Callable) -> Callable:
-    """A command whose errors are one line on stderr and an exit code; adds the option `--debug`, which shows all."""
+    """Make a command whose errors are one line on stderr and an exit code; its new option `--debug` shows the traceback."""
 
     @functools.wraps(function)
     def guarded(*args, debug: bool = False, **kwargs):
@@ -32,7 +32,7 @@ def program(function: Callable) -> Callable:
             with _errors_in_words():
                 return function(*args, **kwargs)
 
-    # typer reads annotations as objects; behind a wrapper it would find their text.
+    # typer needs annotations as objects; on the wrapper it would find only their text.
     hints = typing.get_type_hints(function, include_extras=True)
     own = [p.replace(annotation=hints[name]) for name, p in inspect.signature(function).parameters.items()]
     option = inspect.Parameter("debug", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Debug)
@@ -43,7 +43,7 @@ def program(function: Callable) -> Callable:
 
 
 def join_lines(text: str) -> str:
-    """A docstring whose paragraphs are one line each, for a terminal to break."""
+    """Return a docstring with each paragraph on one line, so that the terminal can wrap it."""
     return "\n\n".join(" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
 
 
@@ -56,10 +56,10 @@ def _errors_in_words() -> Iterator[None]:
     except FilterError as error:
         _leave("failed", error, FAILED)
     except OSError as error:
-        # Reading and writing raise InputError themselves; this is what no one foresaw, such as a full disk.
+        # Reading and writing raise InputError themselves; this is an unforeseen error, such as a full disk.
         _leave("error", f"{error.filename or 'file'}: {error.strerror or error}", BAD_INPUT)
     except KeyboardInterrupt:
-        _leave("stopped", "interrupted; nothing was left half written", INTERRUPTED)
+        _leave("stopped", "interrupted; no file was left half written", INTERRUPTED)
     except typer.Exit:
         raise
     except Exception as error:
@@ -71,12 +71,14 @@ def _leave(kind: str, error: object, exit_code: int) -> None:
     raise typer.Exit(exit_code)
 
 
-DAMAGE = "a program kept from an earlier start is damaged: it is compiled anew, and the next start all"
+DAMAGE = (
+    "a cached program from an earlier start is damaged: it is compiled again, and the next start compiles all again"
+)
 
 
 @contextlib.contextmanager
 def _warnings_in_words() -> Iterator[None]:
-    """jaxveh's own warnings as a line on stderr instead of Python's two with a path."""
+    """Show jaxveh's own warnings as one line on stderr instead of Python's two lines with a path."""
     with warnings.catch_warnings():
         usual, told = warnings.showwarning, []
 
@@ -84,7 +86,7 @@ def _warnings_in_words() -> Iterator[None]:
             if issubclass(category, JaxvehWarning):
                 say("warning", "yellow", message)
             elif is_of_damage(str(message)):
-                # jax says so for each program that it would keep.
+                # jax repeats this warning for each program that it would cache.
                 if not told:
                     say("note", "yellow", DAMAGE)
                 told.append(message)
@@ -96,7 +98,7 @@ def _warnings_in_words() -> Iterator[None]:
 
 
 def say(kind: str, colour: str, message: object) -> None:
-    """One unwrapped line on stderr: `kind: message`."""
+    """Print one unwrapped line on stderr: `kind: message`."""
     line = printable(" ".join(str(message).split()))
     messages().print(f"[bold {colour}]{kind}:[/] ", end="", soft_wrap=True)
     messages().print(line, markup=False, soft_wrap=True)

@@ -1,7 +1,7 @@
-"""Programs that a program starts: none goes on when it ends, however it ends.
+"""Child programs of a program: they all end when it ends, however it ends.
 
-Each child's standard input is a pipe that nobody writes to. It closes when the parent is gone, killed or not, and the child
-ends itself then.
+The standard input of each child is a pipe to which nothing is written. It closes when the parent has ended, killed or not;
+the child then ends itself.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from collections.abc import Iterator, Sequence
 from typing import IO
 
 ENDS_WITH_INPUT = "JAXVEH_ENDS_WITH_INPUT"
-"""The variable that tells a child to end when its standard input does."""
+"""The environment variable that makes a child end when its standard input closes."""
 
 GRACE = 5.0
-"""How long an interrupted child may tidy up, s, before it leaves at once."""
+"""Time for which an interrupted child may tidy up, s, before it ends at once."""
 
 
 class Family:
-    """The children of a program."""
+    """The child programs of a program."""
 
     def __init__(self) -> None:
         self._running: list[subprocess.Popen] = []
@@ -31,8 +31,10 @@ class Family:
 
     @contextlib.contextmanager
     def child(self, command: Sequence[str], stdout: IO, **variables: str) -> Iterator[subprocess.Popen]:
-        """Start a program whose messages are a pipe of text, and wait for its end; `variables` of the environment hold where
-        nobody has set them."""
+        """Start a program whose messages are a pipe of text, and wait for its end.
+
+        `variables` are set in its environment, unless they are set already.
+        """
         with self._lock:
             if self._ended:
                 raise KeyboardInterrupt
@@ -52,7 +54,7 @@ class Family:
                     pipe.close()
 
     def end(self) -> None:
-        """End all children, and let none begin any more."""
+        """End all children, and start no more."""
         with self._lock:
             self._ended = True
             for child in self._running:
@@ -62,7 +64,7 @@ class Family:
 
 @contextlib.contextmanager
 def ends_in_order() -> Iterator[None]:
-    """Make SIGTERM and SIGHUP exits (of 128 and their number) on which `finally` is run; in the main thread, which hears them."""
+    """Turn SIGTERM and SIGHUP into exits (128 plus the signal's number) that run `finally`; only the main thread can do this."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -80,12 +82,12 @@ def ends_in_order() -> Iterator[None]:
 
 
 def end_with_parent() -> None:
-    """In a child: interrupt this process when its standard input ends, and leave if that does not end it."""
+    """In a child: interrupt this process when its standard input closes, and force its end if that does not suffice."""
     if os.environ.pop(ENDS_WITH_INPUT, None) is None:
         return
 
     def watch() -> None:
-        while os.read(0, 1024):  # not sys.stdin, whose lock an ending interpreter would not get
+        while os.read(0, 1024):  # not sys.stdin, whose lock an interpreter that is ending could not acquire
             pass
         done = threading.Event()
         os.kill(os.getpid(), signal.SIGINT)

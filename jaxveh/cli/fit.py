@@ -1,4 +1,4 @@
-"""`jaxveh fit`: a calibration of a car from its logs, to keep and to estimate with."""
+"""`jaxveh fit`: calibrate a car from its logs, and keep the calibration for later estimates."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from jaxveh.cli.estimate import print_fitted
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
 
 PRODUCT = typer.Option(
-    "-o", metavar="FILE", show_default=False, help="The calibration (.toml), for jaxveh estimate --calibration."
+    "-o", metavar="FILE", show_default=False, help="The calibration file (.toml), for jaxveh estimate --calibration."
 )
 CAR_FILE = typer.Option(
     "--car-file",
     metavar="FILE",
     show_default=False,
-    help="Write the car with what was fitted of it, too (.toml): tyres, inertia, steering offset.",
+    help="Also write the car file with the fitted values (.toml): tyres, inertia, steering offset.",
 )
 
 
@@ -40,11 +40,10 @@ def fit(
     force: options.Force = False,
     anyway: options.Anyway = False,
 ) -> None:
-    """Fit the rear axle, noises and sensor offsets of a car to a log, or to several together, and write all that an estimate
-    needs.
+    """Fit the rear axle, noises and sensor offsets of a car to one log, or to several together, and write the calibration.
 
-    What is fitted sees v_x, a_x, a_y, yaw_rate and the channel of --calibrate-on; the front axle of --car-file sees steer,
-    too. The car file is TOML in SI units: [bold]jaxveh schema car[/].
+    The fit uses the channels v_x, a_x, a_y, yaw_rate and that of --calibrate-on; the front axle of --car-file also needs
+    steer. The car file is TOML in SI units: [bold]jaxveh schema car[/].
 
     Examples:
 
@@ -56,13 +55,13 @@ def fit(
     check_product(product, (".toml",), force, sources)
     check_product(car_file, (".toml",), force, sources, "--car-file")
     if car_file is not None and car_file.absolute() == product.absolute():
-        raise InputError(f"--car-file {car_file}: is the calibration, -o; name another file.")
+        raise InputError(f"--car-file {car_file}: is the file of the calibration, -o; name another file.")
     check_report(out, numbers)
     car, uses = io.read_car(vehicle), tuple(calibrate_on or ())
     drives = read_drives(logs, car, channels, fill, span, uses, anyway)
     if out is not None and any("steer" not in drive.recording for drive in drives):
         raise InputError(
-            "--out: the force curves need steer, which the log has not. Name its column, or leave --out away."
+            "--out: the force curves need steer, which is missing from the log. Map its column, or leave --out out."
         )
     parts = [calibration_part(drive.recording, uses) for drive in drives]
     with progress("fit") as report:
@@ -86,13 +85,13 @@ def _write_car(
     calibration: Any, car: io.CarSpecification, drives: list[Drive], parts: list, where: str, file: Path | None, out: Path | None,
     force: bool,
 ) -> list[Path]:  # fmt: skip
-    """The fitted car as a file and as a figure, where they are wanted."""
+    """Write the fitted car as a file and draw its figures, if they are wanted; return the paths of the figures."""
     if file is None and out is None:
         return []
     fitted = sideslip.fitted_car(calibration, car, parts)
     if file is not None:
         io.write_car(fitted, file, note=f"Fitted to {where}.", overwrite=force)
-        results().print(f"{file}: the car as it was fitted", markup=False)
+        results().print(f"{file}: the fitted car", markup=False)
     if out is None:
         return []
     from jaxveh import plots

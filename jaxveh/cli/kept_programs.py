@@ -1,4 +1,4 @@
-"""Programs that were compiled once, kept for the next start: where that is, how large it gets, and what is forgotten."""
+"""The cache of compiled programs for later starts: its folder, its largest size, and what is deleted."""
 
 from __future__ import annotations
 
@@ -9,38 +9,40 @@ import time
 from pathlib import Path
 
 VARIABLE = "JAXVEH_CACHE"
-"""Of the environment: `off`, or another folder."""
+"""The environment variable of the cache: `off`, or another folder."""
 
 JAX_VARIABLE = "JAX_COMPILATION_CACHE_DIR"
-"""Of the environment: who has set it has a cache for jax, which stays."""
+"""The environment variable of jax's own cache: if it is set, that cache is used unchanged."""
 
 OFF = "off"
 
 CANNOT_READ = "Error reading persistent compilation cache entry"
-"""How jax begins to say that a kept program is damaged (a start was killed while it wrote); it would say so at every start."""
+"""How jax's warning of a damaged program begins (a start was killed while writing it); jax would repeat it at every start."""
 
 CANNOT_WRITE = ("Error writing persistent compilation cache entry", "FileNotFoundError")
-"""How it begins to say that it misses the file in which another program's last use should stand (a start was killed between both
-files), and what then comes; it would say so for every program of every start, and keep none."""
+"""The beginning of jax's warning that the file with another program's last use is missing, and its reason.
+
+A start was killed between writing the two files. jax would repeat the warning for every program of every start, and keep none.
+"""
 
 DAMAGED = "damaged"
-"""A file in a folder of programs that says so: the next start begins a new one."""
+"""A file that marks a folder of programs as damaged: the next start replaces the folder by a new one."""
 
 PROGRAM = "-cache"
-"""How jax ends the name of a program's file."""
+"""The ending that jax gives to the name of a program's file."""
 
 MOST = 1_000_000_000
-"""Bytes that the programs of one version and processor may take; those not used for longest go first."""
+"""Largest size of the programs of one version and processor, bytes; those unused for longest are deleted first."""
 
 FORGOTTEN_AFTER = 90 * 86400.0
-"""Seconds after which the folder of another version or processor is dropped."""
+"""Time after which the unused folder of another version or processor is deleted, s."""
 
 WORTH_KEEPING = 0.0
-"""Seconds of compiling from which on a program is kept: all are, for reading one back takes a few milliseconds."""
+"""Least compile time of a program that is kept, s: all are kept, because reading one back takes a few milliseconds."""
 
 
 def root() -> Path | None:
-    """The folder with a folder for each version and processor; None where `JAXVEH_CACHE` is `off`."""
+    """Return the folder that has a folder for each version and processor; None if `JAXVEH_CACHE` is `off`."""
     told = os.environ.get(VARIABLE, "")
     if told.lower() == OFF:
         return None
@@ -52,9 +54,9 @@ def root() -> Path | None:
 
 
 def folder() -> Path | None:
-    """Where this version keeps what it compiles on this processor.
+    """Return the folder for the programs that this version compiles on this processor.
 
-    Code that was compiled for another processor's vectors ends the process, or is refused (jax, issue 38445).
+    Code compiled for the vectors of another processor ends the process, or is refused (jax, issue 38445).
     """
     above = root()
     if above is None:
@@ -68,7 +70,7 @@ def folder() -> Path | None:
 
 
 def keep_programs() -> None:
-    """Let jax keep what it compiles in `folder()`, unless somebody has told jax where to keep it, or `JAXVEH_CACHE` is `off`."""
+    """Let jax keep compiled programs in `folder()`, unless jax has a cache of its own, or `JAXVEH_CACHE` is `off`."""
     if JAX_VARIABLE in os.environ:
         return
     try:
@@ -83,7 +85,7 @@ def keep_programs() -> None:
         os.utime(place)
     except OSError as error:
         print(
-            f"note: compiled programs are not kept ({error}); every start compiles anew. Set {VARIABLE} to a folder that can be "
+            f"note: compiled programs are not kept ({error}); every start compiles again. Set {VARIABLE} to a folder that can be "
             f"written, or to {OFF}.",
             file=sys.stderr,
         )
@@ -96,12 +98,12 @@ def keep_programs() -> None:
 
 
 def folders(above: Path) -> list[Path]:
-    """Those of all versions and processors; whatever else lies beside them is not ours."""
+    """Return the folders of all versions and processors; anything else beside them does not belong to jaxveh."""
     return sorted(one for one in above.glob("jaxveh-*-jaxlib-*") if one.is_dir())
 
 
 def is_of_damage(message: str) -> bool:
-    """Whether a warning is jax's that it cannot read a kept program, or none beside it; then the next start forgets them all."""
+    """Return whether a warning of jax means that kept programs are damaged; if so, mark them for deletion at the next start."""
     begin, reason = CANNOT_WRITE
     damaged = message.startswith(CANNOT_READ) or (message.startswith(begin) and reason in message)
     place = folder() if JAX_VARIABLE not in os.environ and damaged else None
@@ -112,7 +114,7 @@ def is_of_damage(message: str) -> bool:
 
 
 def drop_old(above: Path) -> None:
-    """Remove folders of versions and processors that have not been used for long."""
+    """Delete folders of versions and processors that have not been used for `FORGOTTEN_AFTER`."""
     for one in folders(above):
         if time.time() - one.stat().st_mtime > FORGOTTEN_AFTER:
             shutil.rmtree(one, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""The manoeuvre that options name, with its own settings from `--set name=value`."""
+"""The manoeuvre that the options name, with its own settings from `--set name=value`."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from jaxveh._core.errors import check_one_of, did_you_mean
 from jaxveh.manoeuvres import MANOEUVRES, USUAL, Course, manoeuvre_options, options_of_car
 
 NOT_SET = {"speed": "--speed", "to_speed": "--speed", "steer": "--steer-deg", "duration": "--duration", "key": "--seed"}
-"""What has an option of its own."""
+"""Settings that have a command-line option of their own."""
 
 
 class AskedManoeuvre(NamedTuple):
-    """A manoeuvre as the command line asks for it."""
+    """A manoeuvre as requested on the command line."""
 
     name: str
     speed: float
@@ -28,9 +28,9 @@ class AskedManoeuvre(NamedTuple):
 def parse_manoeuvre(
     name: str, speed: float | None, steer_deg: float | None, duration: float | None, settings: Sequence[str], car: Any
 ) -> AskedManoeuvre:
-    """The manoeuvre of a name with usual values for what is None, its `name=value` settings, and what it wants of the car.
+    """Return the manoeuvre of a name with its `name=value` settings and its options from the car; None means the usual value.
 
-    Raises `InputError` for an unknown manoeuvre or setting, and for a setting that is no number.
+    Raises `InputError` for an unknown manoeuvre or setting, and for a setting that is not a number.
     """
     check_one_of("--manoeuvre", name, MANOEUVRES)
     usual_speed, usual_steer = USUAL[name]
@@ -43,12 +43,12 @@ def parse_manoeuvre(
 
 
 def make(one: AskedManoeuvre, key: jax.Array) -> Any:
-    """The manoeuvre or driver; `key` for random ones."""
+    """Make the manoeuvre or driver; random ones use `key`."""
     return manoeuvres.named_manoeuvre(one.name, one.speed, math.radians(one.steer_deg), key, **one.options)
 
 
 def course_of(one: AskedManoeuvre) -> Course | None:
-    """The cones that the manoeuvre goes through, None where there are none."""
+    """Return the cones of the manoeuvre's course; None if it has no course."""
     options = {**manoeuvre_options(one.name), **one.options}
     if one.name == "slalom-course":
         return manoeuvres.slalom_cones(options["spacing"], options["count"], options["start"])
@@ -59,7 +59,7 @@ def course_of(one: AskedManoeuvre) -> Course | None:
 
 
 def width_of(one: AskedManoeuvre) -> float:
-    """The width of the car that the course is made for, m; where it has none of its own, that of the ISO lane change."""
+    """Return the width of the car for which the course is made, m; by default that of the ISO lane change."""
     return {**manoeuvre_options("iso-lane-change"), **manoeuvre_options(one.name), **one.options}["width"]
 
 
@@ -83,4 +83,4 @@ def _number(text: str, value: str, whole: bool) -> float | int:
     try:
         return int(value) if whole else float(value)
     except ValueError:
-        raise InputError(f"--set {text}: {value!r} is no {'whole ' if whole else ''}number.") from None
+        raise InputError(f"--set {text}: {value!r} is not a {'whole ' if whole else ''}number.") from None

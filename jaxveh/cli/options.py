@@ -1,4 +1,4 @@
-"""Options that several programs share, said once."""
+"""Options that several programs share."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ VehicleFile = Annotated[
 Channels = Annotated[
     Path | None,
     typer.Option(
-        "--channels", metavar="MAP.toml", help="Which column is which channel, unit and sign (jaxveh schema channels)."
+        "--channels", metavar="MAP.toml", help="Map columns to channels, with unit and sign (jaxveh schema channels)."
     ),
 ]
 
@@ -37,7 +37,7 @@ Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write fi
 Force = Annotated[bool, typer.Option("--force", help="Let -o replace an existing file.")]
 
 Seed = Annotated[
-    int, typer.Option("--seed", help="Of the random numbers; the same seed gives the same numbers.", min=0)
+    int, typer.Option("--seed", help="Seed of the random numbers; the same seed gives the same result.", min=0)
 ]
 
 Calibrate = Annotated[
@@ -45,8 +45,8 @@ Calibrate = Annotated[
     typer.Option(
         "--calibrate",
         metavar="START:END",
-        help="Fit the rear axle, noises and sensor offsets on this span first, in seconds of the log's time; either end may be "
-        "left out (150: or :287.5).",
+        help="First fit the rear axle, noises and sensor offsets on this span, in seconds of the log's time. Either end may be "
+        "omitted (150: or :287.5).",
     ),
 ]
 
@@ -55,18 +55,18 @@ Span = Annotated[
     typer.Option(
         "--span",
         metavar="START:END",
-        help="Take this part of each log alone, in seconds of its own time; either end may be left out (150: or :287.5).",
+        help="Use only this part of each log, in seconds of its own time. Either end may be omitted (150: or :287.5).",
     ),
 ]
 
-Anyway = Annotated[bool, typer.Option("--anyway", help="Go on where the check of a log finds errors.")]
+Anyway = Annotated[bool, typer.Option("--anyway", help="Continue although the check of a log finds errors.")]
 
 CalibrateOn = Annotated[
     list[str] | None,
     typer.Option(
         "--calibrate-on",
         metavar="CHANNEL",
-        help="A channel that the calibration may use inside its span besides the blind ones: v_y or sideslip.",
+        help="A reference channel that the calibration may use inside its span: v_y or sideslip. Repeatable.",
     ),
 ]
 
@@ -75,22 +75,22 @@ Fill = Annotated[
     typer.Option(
         "--fill",
         metavar="SECONDS",
-        help="Fill gaps (NaN) of steer, v_x and a_x along lines, over at most so long; without it a gap there is an error.",
+        help="Fill gaps (NaN) in steer, v_x and a_x by linear interpolation, up to this length; otherwise a gap is an error.",
     ),
 ]
 
 
 def span_of(text: str | None, start: float, end: float, option: str = "--calibrate") -> tuple[float, float] | None:
-    """START:END, as an `option` gives it, as seconds of a log that runs from `start` to `end`; None where there is none.
+    """Read START:END, the value of an `option`, in seconds of a log that runs from `start` to `end`; None if `text` is None.
 
-    Raises `InputError` for what is no span, or lies outside the log.
+    Raises `InputError` if the text is no span, or the span lies outside the log.
     """
     if text is None:
         return None
     left, colon, right = text.partition(":")
     try:
         first = float(left) if left.strip() else start
-        # Rows strictly before the end count, so that an open end must lie beyond the last.
+        # Only rows strictly before the end count: an open end must lie beyond the last row.
         last = float(right) if right.strip() else float("inf")
     except ValueError:
         first = last = float("nan")

@@ -1,4 +1,4 @@
-"""What programs write: `-o FILE` the product, `--out DIR` the report's figures, `--json FILE` every number shown."""
+"""The files that programs write: `-o FILE` the output, `--out DIR` the figures, `--json FILE` every number shown."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ def check_product(
     sources: tuple[Path | None, ...] = (),
     option: str = "-o",
 ) -> None:
-    """Raise before any work where the file of an `option` could not be written in the end: suffix, folder, an existing file, an
-    input."""
+    """Raise `InputError`, before any work, if the file of an `option` could not be written in the end.
+
+    Reasons are its suffix, its folder, an existing file without `force`, and a file that is one of the inputs (`sources`).
+    """
     if path is None:
         return
     if path.suffix.lower() not in suffixes:
@@ -41,7 +43,7 @@ def check_product(
 
 
 def check_products(folder: Path, files: list[Path], force: bool, sources: tuple[Path | None, ...] = ()) -> None:
-    """The same for several files in a folder, which is made where it is not there."""
+    """Check several files in a folder like `check_product`; the folder is created if it does not exist."""
     if folder.exists() and not folder.is_dir():
         raise InputError(f"-o {folder}: is a file; several logs need a folder.")
     names = [file.name for file in files]
@@ -57,13 +59,13 @@ def check_products(folder: Path, files: list[Path], force: bool, sources: tuple[
 
 
 def check_report(out: Path | None, numbers: Path | None) -> None:
-    """Raise before any work where `--out` or `--json` could not be written, or matplotlib is missing."""
+    """Raise `InputError`, before any work, if `--out` or `--json` could not be written, or matplotlib is missing."""
     if out is not None:
         if out.exists() and not out.is_dir():
             raise InputError(f"--out {out}: is a file; name a folder.")
         io.kit.require("matplotlib", "drawing figures", "plot")
     if numbers is not None:
-        # The suffix keeps a slip of the keyboard from replacing a log or a car.
+        # The required suffix prevents a typing error from replacing a log or a car file.
         if numbers.suffix.lower() != ".json":
             raise InputError(f"--json {numbers}: suffix {numbers.suffix!r}; it must end in .json.")
         if numbers.is_dir():
@@ -74,13 +76,13 @@ def check_report(out: Path | None, numbers: Path | None) -> None:
 def _check_folder(path: Path, option: str) -> None:
     folder = path.absolute().parent
     if not folder.is_dir():
-        raise InputError(f"{option} {path}: there is no folder {folder}; make it first.")
+        raise InputError(f"{option} {path}: there is no folder {folder}; create it first.")
     if not os.access(folder, os.W_OK):
         raise InputError(f"{option} {path}: the folder {folder} cannot be written to.")
 
 
 def make_folder(out: Path) -> None:
-    """The report's folder, made where it is not there."""
+    """Create the folder of the figures if it does not exist."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -90,7 +92,7 @@ def make_folder(out: Path) -> None:
 def write_numbers(
     path: Path | None, numbers: Mapping[str, Any], configuration: Mapping[str, Any], seed: int | None
 ) -> None:
-    """Write numbers and the manifest as JSON, replacing what was there; what is not finite becomes null."""
+    """Write numbers and the manifest as JSON, replacing an existing file; numbers that are not finite become null."""
     if path is None:
         return
     content = {"manifest": manifest(configuration, seed), **numbers}
@@ -99,7 +101,7 @@ def write_numbers(
 
 
 def manifest(configuration: Mapping[str, Any], seed: int | None) -> dict[str, Any]:
-    """Where numbers come from: versions, platform, seed, configuration, command line."""
+    """Return the origin of the numbers: versions, platform, seed, configuration, command line."""
     import jax
 
     return {
@@ -124,7 +126,7 @@ def manifest(configuration: Mapping[str, Any], seed: int | None) -> dict[str, An
 
 
 def plain(value: Any) -> Any:
-    """Python numbers, strings, lists and dicts of whatever holds arrays; NaN and infinity become None."""
+    """Convert nested containers of arrays to Python numbers, strings, lists and dicts; NaN and infinity become None."""
     if hasattr(value, "_asdict"):
         value = value._asdict()
     if isinstance(value, Mapping):

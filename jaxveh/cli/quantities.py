@@ -1,4 +1,4 @@
-"""`jaxveh estimate --what`: quantities by their methods, side by side, and what each is worth."""
+"""`jaxveh estimate --what`: quantities estimated by their methods, side by side, and the error of each."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from jaxveh.estimators import Answers, Compared, MethodScore
 from jaxveh.io import CarSpecification
 
 ALL = "all"
-"""Of `--what`: the recommended method of each quantity that the log has channels for; of `--methods`: all of them."""
+"""In `--what`: each quantity that the log has channels for, by its recommended method; in `--methods`: all methods."""
 
 NOTHING = "nothing done"
 
 ALIKE = {"v_y": ("v_y", "sideslip"), "sideslip": ("v_y", "sideslip"), "speed": ("speed", "v_x"), "v_x": ("v_x",)}
-"""Channels that say a truth, too: no method gets to see them."""
+"""Channels that reveal the truth of a quantity: they are hidden from every method."""
 
 
 class Asked(NamedTuple):
-    """The options of `estimate` that count here; `methods` is None where the recommended ones are asked for."""
+    """The options of `estimate` that apply to quantities; `methods` is None for the recommended methods."""
 
     logs: list[Path]
     product: Path
@@ -46,7 +46,10 @@ class Asked(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """Of one quantity and one log: what was compared, and the scores by method and name; that of doing nothing by name alone."""
+    """The result for one quantity and one log: the compared methods, and their scores by method and name.
+
+    `nothing` is the RMSE of the do-nothing baseline, by name.
+    """
 
     compared: Compared
     scores: dict[str, dict[str, MethodScore]]
@@ -54,9 +57,9 @@ class Shown(NamedTuple):
 
 
 def names_of(text: str, option: str, known: Sequence[str]) -> tuple[str, ...]:
-    """The names of an option's value, separated by commas, each once; `all` among them is all that are known.
+    """Split an option's value at commas into names without repetition; `all` stands for all known names.
 
-    **Raises** `InputError` for a name that is not known.
+    **Raises** `InputError` for an unknown name.
     """
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
     for name in names:
@@ -65,9 +68,9 @@ def names_of(text: str, option: str, known: Sequence[str]) -> tuple[str, ...]:
 
 
 def quantities_asked(choice: Any, what: str, methods: str | None) -> Asked | None:
-    """What `estimate` was asked for in `choice`, its options; None where that is sideslip, by its own program.
+    """Return the request in `choice`, the options of `estimate`; None if it is for sideslip by its own program.
 
-    **Raises** `InputError` for a quantity or a method that is not there, or an option of that program.
+    **Raises** `InputError` for an unknown quantity or method, or an option that only the sideslip program has.
     """
     quantities = names_of(what, "--what", tuple(QUANTITIES))
     if quantities == (estimators.sideslip.NAME,) and methods is None:
@@ -79,7 +82,7 @@ def quantities_asked(choice: Any, what: str, methods: str | None) -> Asked | Non
     }  # fmt: skip
     given = [option for option, value in others.items() if value]
     if given:
-        raise InputError(f"{', '.join(given)}: of --what sideslip without --methods alone; leave it out.")
+        raise InputError(f"{', '.join(given)}: only for --what sideslip without --methods; leave it out.")
     return Asked(
         choice.logs, choice.product, choice.vehicle, choice.channels, choice.span, choice.fill, quantities,
         methods_of(methods, quantities), choice.truth, choice.out, choice.force, choice.anyway,
@@ -87,20 +90,20 @@ def quantities_asked(choice: Any, what: str, methods: str | None) -> Asked | Non
 
 
 def methods_of(text: str | None, what: tuple[str, ...]) -> tuple[str, ...] | None:
-    """The methods of `--methods`; None where the recommended ones are meant.
+    """Return the methods of `--methods`; None for the recommended ones.
 
-    **Raises** `InputError` for several quantities, or a name that its quantity has not.
+    **Raises** `InputError` for several quantities, or for a name that is no method of the quantity.
     """
     if text is None:
         return None
     quantity, *others = what
     if others:
-        raise InputError(f"--methods is of one quantity: name one with --what, not {', '.join(what)}.")
+        raise InputError(f"--methods applies to one quantity: name one with --what, not {', '.join(what)}.")
     return names_of(text, f"--methods of {quantity}", tuple(QUANTITIES[quantity].METHODS))
 
 
 def estimate_quantities(asked: Asked, numbers: Path | None) -> None:
-    """Estimate what is asked for along each log, print, draw and write it."""
+    """Estimate the requested quantities along each log, then print, draw and write the results."""
     check_report(asked.out, numbers)
     products, car = _check(asked)
     found: dict[str, Any] = {}
@@ -118,7 +121,7 @@ def estimate_quantities(asked: Asked, numbers: Path | None) -> None:
 
 
 def _check(asked: Asked) -> tuple[list[Path], CarSpecification]:
-    """The files to write, and the car. Raises where one could not be written, or options contradict each other."""
+    """Return the files to write, and the car; raise `InputError` if a file could not be written, or options conflict."""
     sources = (*asked.logs, asked.vehicle, asked.channels)
     if asked.vehicle is None:
         raise InputError("--vehicle is missing: give the car's file (jaxveh schema car).")
@@ -136,7 +139,7 @@ def _check(asked: Asked) -> tuple[list[Path], CarSpecification]:
 
 
 def _log(asked: Asked, log: Path, car: CarSpecification) -> tuple[Recording, Recording]:
-    """What the methods see of a log, and all of it."""
+    """Return the part of a log that the methods may use, and the whole log."""
     drive = read_log(log, car, asked.channels, asked.span, (asked.truth,), asked.anyway)
     recording = drive.recording
     if asked.truth is None:
@@ -150,7 +153,7 @@ def _log(asked: Asked, log: Path, car: CarSpecification) -> tuple[Recording, Rec
 
 
 def _filled(asked: Asked, recording: Recording) -> Recording:
-    """Inputs without gaps, where that is asked for."""
+    """Fill gaps in the inputs if `--fill` is given."""
     if asked.fill is None:
         return recording
     for name in ("steer", "v_x", "a_x"):
@@ -160,7 +163,10 @@ def _filled(asked: Asked, recording: Recording) -> Recording:
 
 
 def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, seen: Recording, recording: Recording) -> Shown:
-    """One quantity along one log. With `--what all` what the log cannot give is refused; what was asked for by name raises."""
+    """Estimate one quantity along one log.
+
+    With several quantities, one that the log does not allow is listed as refused; a single quantity raises.
+    """
     if asked.methods is None and len(asked.what) > 1:
         compared = _recommended(quantity, car, seen)
     elif asked.methods is not None and set(asked.methods) == set(quantity.METHODS):
@@ -179,7 +185,7 @@ def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, seen: Record
 
 
 def _recommended(quantity: ModuleType, car: CarSpecification, seen: Recording) -> Compared:
-    """The recommended method, or why it is not to be had."""
+    """Run the recommended method, or record the reason why it cannot run."""
     try:
         return estimators.compare(car, seen, quantity, [quantity.RECOMMENDED])
     except InputError as error:
@@ -187,13 +193,13 @@ def _recommended(quantity: ModuleType, car: CarSpecification, seen: Recording) -
 
 
 def _conclude(asked: Asked, log: Path, product: Path, recording: Recording, found: dict[str, Shown]) -> dict[str, Any]:
-    """Print, write and draw what became of one log: its numbers for the JSON file."""
+    """Print, write and draw the results for one log; return its numbers for the JSON file."""
     _print(log, found)
     answers = {
         (quantity, method): one for quantity, shown in found.items() for method, one in shown.compared.answers.items()
     }
     if not answers:
-        raise InputError(f"{log.name}: no quantity can be estimated; the reasons stand above.")
+        raise InputError(f"{log.name}: no quantity can be estimated; the reasons are printed above.")
     io.write_frame(_frame(answers), product, overwrite=asked.force)
     results().print(
         f"{product}: {len(recording)} rows of {', '.join(_label(*key, answers) or '.'.join(key) for key in answers)}",
@@ -251,7 +257,7 @@ def _cells(score: MethodScore | None) -> tuple[str, ...]:
 
 
 def _label(quantity: str, method: str, answers: dict[tuple[str, str], Answers]) -> str:
-    """What stands before a column's name: nothing where there is one answer; the quantity, and its method where several are."""
+    """Return the prefix of a column's name: none for a single answer, else the quantity, with its method if it has several."""
     if len(answers) == 1:
         return ""
     several = sum(key[0] == quantity for key in answers) > 1
@@ -259,7 +265,7 @@ def _label(quantity: str, method: str, answers: dict[tuple[str, str], Answers]) 
 
 
 def _frame(answers: dict[tuple[str, str], Answers]) -> Any:
-    """A column for what each method shows, its spread, and whether it is known (0 or 1)."""
+    """Return columns with the outputs of each method, their standard deviations, and whether each is known (0 or 1)."""
     columns, units = {}, {}
     for key, one in answers.items():
         before = _label(*key, answers)
@@ -292,10 +298,10 @@ def _numbers(shown: Shown) -> dict[str, Any]:
 
 
 def _draw(asked: Asked, log: Path, recording: Recording, found: dict[str, Shown]) -> list[Path]:
-    """A figure a quantity: all its methods, and the truth."""
+    """Draw one figure per quantity, with all its methods and the truth."""
     from jaxveh import plots
 
-    assert asked.out is not None  # who draws has a folder
+    assert asked.out is not None  # the caller draws only if there is a folder
     out = asked.out if len(asked.logs) == 1 else asked.out / log.stem
     make_folder(out)
     paths = []

@@ -1,4 +1,4 @@
-"""The options of `jaxveh estimate` that name quantities and methods, and the list of both."""
+"""The options of `jaxveh estimate` that select quantities and methods, and the list of both."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ QUANTITIES: dict[str, ModuleType] = {
     for name in estimators.__all__
     if isinstance(getattr(estimators, name), ModuleType) and hasattr(getattr(estimators, name), "METHODS")
 }
-"""By the name that `--what` takes."""
+"""The modules of the quantities, by the name that `--what` takes."""
 
 USUAL_FILTER, USUAL_PARTICLES = "ekf", 1000
-"""Of sideslip's own program; methods bring their filters with them."""
+"""Defaults of the sideslip program; the methods of the other quantities choose their own filters."""
 
 What = Annotated[
     str,
     typer.Option(
         "--what",
         metavar="QUANTITY",
-        help="sideslip (calibrated and smoothed, with all options here), or by one of its methods each: "
-        f"{', '.join(QUANTITIES)}; several with commas; all: whatever the log can tell.",
+        help="What to estimate. sideslip without --methods is calibrated and smoothed, and takes all options here. Otherwise: "
+        f"quantities by their methods, separated by commas: {', '.join(QUANTITIES)}; all: every one that the log allows.",
     ),
 ]
 
 
 def print_methods(wanted: bool) -> None:
-    """Print the methods of each quantity, and leave, where that is `wanted`."""
+    """Print the methods of each quantity and end the program, if that is `wanted`."""
     if not wanted:
         return
     for name, module in QUANTITIES.items():
         mark = lambda method, module=module: " *" if method == module.RECOMMENDED else ""
         rows = [(method + mark(method), one.help, one.source) for method, one in module.METHODS.items()]
         shown = ", ".join(f"{field} [{unit}]" for field, unit in module.SHOWN.items())
-        table(f"--what {name}: {shown}", ("method (* recommended)", "what it is", "from"), rows, left=3)
+        table(f"--what {name}: {shown}", ("method (* recommended)", "description", "source"), rows, left=3)
     raise typer.Exit
 
 
@@ -49,7 +49,7 @@ Methods = Annotated[
         "--methods",
         metavar="NAMES",
         show_default=False,
-        help="Methods to run side by side, with commas, or all (--list shows them).",
+        help="Methods to run side by side, separated by commas, or all (--list shows them).",
     ),
 ]
 

@@ -1,4 +1,4 @@
-"""`jaxveh reproduce NAME`: a paper's tables, as printed and honestly, and the checks."""
+"""`jaxveh reproduce NAME`: the tables of a paper, as printed and with fair settings, and its criteria."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ PAPERS = {
     "sideslip-review": "the catalogue of sideslip estimation, its circles and crosses as numbers (Chen, Gao, Xu 2013)",
     "mass-grade-aukf": "mass and road grade at small acceleration by adaptive unscented Kalman filter",
 }
-"""The papers by name: the module is `jaxveh.experiments.` and the name, with underscores."""
+"""The papers by name: the module is `jaxveh.experiments.` plus the name with underscores."""
 
 ALL = "all"
 
 LOGGED = "sideslip-review"
-"""The paper whose methods are also judged by a real log."""
+"""The paper whose methods can also be judged on a real log."""
 
 LOG = typer.Option("--log", help=f"{LOGGED}: a log with steer, v_x, a_x, a_y, yaw_rate, and v_y to score against.")
-CAR = typer.Option("--vehicle", help="The log's car (see `jaxveh schema car`).")
+CAR = typer.Option("--vehicle", help="The car of the log (see `jaxveh schema car`).")
 
 NAME = typer.Argument(
     metavar="NAME",
@@ -50,11 +50,14 @@ def reproduce(
     name: Annotated[str, NAME],
     seeds: Annotated[
         int | None,
-        typer.Option("--seeds", help="How many, at least 2. Default: what the paper's own checks need.", min=2),
+        typer.Option(
+            "--seeds", help="Number of seeds, at least 2. Default: as many as the paper's criteria need.", min=2
+        ),
     ] = None,
     seed: options.Seed = 0,
     as_printed: Annotated[
-        bool, typer.Option("--as-printed", help="Only the paper's printed settings, errata included, and what they do.")
+        bool,
+        typer.Option("--as-printed", help="Only the paper's printed settings, errata included, and their results."),
     ] = False,
     log: Annotated[Path | None, LOG] = None,
     car: Annotated[Path | None, CAR] = None,
@@ -64,12 +67,13 @@ def reproduce(
     numbers: options.Numbers = None,
     out: options.Out = None,
 ) -> None:
-    """Compute a paper again: its tables as printed and honestly, and criteria that hold, fail or stay open.
+    """Reproduce a paper: its tables, as printed and with fair settings, and criteria that are met, failed or open.
 
-    Every table has the do-nothing baseline, medians and quartiles over seeds; each criterion says who was told what of the
-    truth. Counted are criteria as they were asked; what took the place of one stands beside it. Some minutes each on two cores.
-    With --out each paper's figures are drawn, with --json every number and each check is written. With --store thousands of
-    seeds survive being killed; of [bold]all[/] each paper has a folder of its name in it, as it has in --out.
+    Every table has the do-nothing baseline, and medians and quartiles over seeds; each criterion says who was told what of the
+    truth. Only the original criteria are counted; a substitute stands beside its original. Each paper takes some minutes on
+    two cores.
+    --out draws the figures of a paper, --json writes every number and each criterion. With --store a run over thousands of
+    seeds can be killed and continued. With [bold]all[/] each paper has a folder of its name in those of --store and --out.
 
     Example: [bold]jaxveh reproduce mass-grade-aukf --json mass_grade.json --out report/[/]
 
@@ -86,7 +90,7 @@ def reproduce(
         all_papers(
             {name: asked | (more if name == LOGGED else {}) for name in PAPERS},
             numbers,
-            # Each has the processes to itself.
+            # One paper at a time, so that it has the processes to itself.
             at_once=None if processes is None else 1,
         )
         return
@@ -99,19 +103,19 @@ def reproduce(
 
 
 def _check_log(name: str, log: Path | None, car: Path | None, as_printed: bool) -> None:
-    """Raise where a log is given without its car, or to a paper that does not look at it."""
+    """Raise `InputError` if a log is given without its car, or for a paper that does not use a log."""
     if (log is None) != (car is None):
         raise InputError("--log and --vehicle belong together: give both, or neither.")
     if log is not None and name not in (LOGGED, ALL):
-        raise InputError(f"--log: only {LOGGED} looks at a log; leave it out, or reproduce that paper.")
+        raise InputError(f"--log: only {LOGGED} uses a log; leave it out, or reproduce that paper.")
     if log is not None and as_printed:
-        raise InputError("--log: nothing is printed of it; leave it out, or --as-printed.")
+        raise InputError("--log: --as-printed uses no log; leave out --log or --as-printed.")
 
 
 def _one(
     name: str, asked: dict[str, Any], as_printed: bool, report: Progress, out: Path | None, stores: Stores | None
 ) -> dict[str, Any]:
-    """Run one paper as `asked` and show it; what it found, for JSON."""
+    """Run one paper with the options `asked`, print its results, and return them for the JSON file."""
     from jaxveh import experiments
 
     _every_core()
@@ -138,8 +142,10 @@ def _one(
 
 
 def _show_checks(name: str, checks: Sequence[experiments.report.Check]) -> None:
-    """Criteria with value, bound and the number of their condition, and the conditions below; below each criterion as it was
-    asked those that stand beside it, which are not counted."""
+    """Print the criteria with value, bound and the number of their condition, and the conditions below the table.
+
+    Below each original criterion stand its substitutes, which are not counted.
+    """
     from jaxveh import experiments
 
     notes = {condition: i for i, condition in enumerate(dict.fromkeys(c.condition for c in checks), 1)}
@@ -151,11 +157,11 @@ def _show_checks(name: str, checks: Sequence[experiments.report.Check]) -> None:
     table(f"{name}: criteria", ("status", "criterion", "value", "bound", "where"), rows, left=2)
     for condition, i in notes.items():
         results().print(f"where {i}: {condition}", markup=False)
-    results().print(f"{experiments.report.tally(checks)} hold, as they were asked")
+    results().print(f"original criteria that hold: {experiments.report.tally(checks)}")
 
 
 def _draw(experiment: ModuleType, found: Any, out: Path) -> None:
-    """Draw the figures and say where they are."""
+    """Draw the figures and print their paths."""
     from jaxveh import plots
 
     make_folder(out)
@@ -169,12 +175,12 @@ def _experiment(name: str) -> ModuleType:
 
 
 def _every_core() -> None:
-    """Let sweeps split over the machine's cores, unless jax has begun or someone has decided otherwise."""
+    """Let sweeps use all cores of the machine, unless jax has started already, or the environment sets the number of devices."""
     import jax
 
     if "JAX_NUM_CPU_DEVICES" in os.environ or "xla_force_host_platform" in os.environ.get("XLA_FLAGS", ""):
         return
     try:
         jax.config.update("jax_num_cpu_devices", os.cpu_count() or 1)
-    except RuntimeError:  # the devices have been made: what there is stays
+    except RuntimeError:  # jax has made its devices already: their number stays
         return

@@ -1,4 +1,4 @@
-"""`jaxveh schema`: the files that programs read, as commented examples."""
+"""`jaxveh schema`: commented examples of the files that the programs read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from jaxveh.io import CANONICAL, kit
 
 
 class File(StrEnum):
-    """Which file to explain."""
+    """The file to explain."""
 
     car = "car"
     channels = "channels"
@@ -23,7 +23,7 @@ def schema(
 ) -> None:
     """Print a commented example of the file that describes a car, of a channel map, or of a study (jaxveh sweep).
 
-    All examples can be read as they are: [bold]jaxveh schema car > car.toml[/] is a start.
+    Every example is a valid file: [bold]jaxveh schema car > car.toml[/] is a good start.
     """
     if file is File.car:
         typer.echo(kit.CAR_SCHEMA, nl=False)

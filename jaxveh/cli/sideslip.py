@@ -1,4 +1,4 @@
-"""Between the programs' words and the estimators of sideslip: the one place that knows both."""
+"""The link between the programs' options and the estimators of sideslip; no other module uses both."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from jaxveh.io import CarSpecification
 NAME = sideslip.NAME
 
 SCORED = ("v_y", "sideslip")
-"""Channels that `--truth` can name."""
+"""The channels that `--truth` can name."""
 
 
 def filter_of(name: str, particles: int) -> filters.AbstractFilter:
-    """The filter of an option's name."""
+    """Return the filter that the option names."""
     if name in ("ekf", "ukf"):
         return filters.Extended() if name == "ekf" else filters.Unscented()
     return (filters.AuxiliaryParticleFilter if name == "apf" else filters.ParticleFilter)(particles)
@@ -32,35 +32,37 @@ def filter_of(name: str, particles: int) -> filters.AbstractFilter:
 def calibrate(
     car: CarSpecification, parts: Sequence[Recording], uses: tuple[str, ...], progress: Progress
 ) -> Calibration:
-    """The rear axle, noises and sensor offsets fitted on spans of a car's logs."""
+    """Fit the rear axle, noises and sensor offsets on spans of a car's logs."""
     return sideslip.calibrate(car, parts, uses=uses, progress=progress)
 
 
 def read_calibration(path: Path, car: CarSpecification | None) -> Calibration:
-    """A calibration of sideslip from its file.
+    """Read a calibration of sideslip from its file.
 
-    **Raises** `InputError` for one of another estimator, or where a `car` is given that is not the one that was calibrated.
+    **Raises** `InputError` for a calibration of another estimator, or if `car` is given and is not the calibrated car.
     """
     found = estimators.read_calibration(path)
     if found.estimator != sideslip.NAME:
-        raise InputError(f"--calibration {path}: is one of {found.estimator}: must be one of {sideslip.NAME}.")
-    assert found.told is not None  # a file has it
+        raise InputError(
+            f"--calibration {path}: is a calibration of {found.estimator}; must be one of {sideslip.NAME}."
+        )
+    assert found.told is not None  # a file always has it
     if car is not None and car != found.told.car:
         names = [entry.name for entry in dataclasses.fields(car)]
         name = next(name for name in names if getattr(car, name) != getattr(found.told.car, name))
         raise InputError(
-            f"--calibration {path}: is of another car: its {name} is {getattr(found.told.car, name)}, that of --vehicle "
+            f"--calibration {path}: is of another car: its {name} is {getattr(found.told.car, name)}, but that of --vehicle is "
             f"{getattr(car, name)}. Leave --vehicle out, or calibrate this car."
         )
     return found
 
 
 def why_not_calibrated(part: Recording) -> str | None:
-    """Why a log cannot calibrate itself, None where it can."""
+    """Return why a log cannot calibrate itself; None if it can."""
     if "a_y" not in part or not np.isfinite(np.asarray(part["a_y"])).any():
         return "the log has no a_y"
     length = float(part.time[-1] - part.time[0])
-    return None if length >= sideslip.SHORTEST else f"{length:.3g} s are too few ({sideslip.SHORTEST:g} s needed)"
+    return None if length >= sideslip.SHORTEST else f"{length:.3g} s are too short ({sideslip.SHORTEST:g} s are needed)"
 
 
 def estimate(
@@ -70,22 +72,22 @@ def estimate(
     particles: int = 1000,
     seed: int = 0,
 ) -> filters.Estimate | filters.SmoothedEstimate:
-    """The states along the rows of `part`, of a calibration or of a car's file taken at its word."""
+    """Estimate the states along the rows of `part`, with a calibration or with the values of a car file."""
     return sideslip.estimate(source, part, filter=filter_of(kind, particles), key=jax.random.key(seed))
 
 
 def least_speed_of(car: CarSpecification) -> float:
-    """Speed (m/s) below which sideslip is not scored."""
+    """Return the speed (m/s) below which sideslip is not scored."""
     return sideslip.least_speed_of(car)
 
 
 def _reference(seen: Recording, name: str) -> Recording:
-    """The log with the truth channel, one of `SCORED`, as its v_y, where that is measured."""
+    """Return the log with the truth channel, one of `SCORED`, as its v_y at the place of the sensor."""
     return seen if name == "v_y" else seen.replace(v_y=np.asarray(seen["v_x"]) * np.tan(np.asarray(seen[name])))
 
 
 def truth_of(car: CarSpecification, seen: Recording, name: str) -> dict[str, np.ndarray]:
-    """What the truth channel says of the quantities that are shown, by name (T,), at the centre of gravity as they are."""
+    """Return the true values of the displayed quantities from the truth channel, by name (T,), at the centre of gravity."""
     v_x, v_y = np.asarray(seen["v_x"]), np.asarray(sideslip.at_centre(car, _reference(seen, name))["v_y"])
     return {"v_y": v_y, "sideslip": np.arctan2(v_y, v_x)}
 
@@ -93,17 +95,17 @@ def truth_of(car: CarSpecification, seen: Recording, name: str) -> dict[str, np.
 def score(
     car: CarSpecification, found: filters.Estimate | filters.SmoothedEstimate, seen: Recording, name: str
 ) -> dict[str, float]:
-    """RMSEs and the coverage of the 95 % band, next to the open-loop linear model's, by the names of the JSON file."""
+    """Return RMSEs and the coverage of the 95 % band, and those of the open-loop linear model, by the names of the JSON file."""
     return sideslip.score(car, found, _reference(seen, name))
 
 
 def open_loop(car: CarSpecification, seen: Recording) -> dict[str, np.ndarray]:
-    """What a linear single track makes of steer and speed alone, by name (T,)."""
+    """Return the states of a linear single track driven by steer and speed alone, by name (T,)."""
     return drive_open_loop(vehicles.from_specification(car), seen)
 
 
 def fitted_parameters(calibration: Calibration | None) -> dict[str, Any]:
-    """The fitted parameters by name (value, std, unit) and the choice of the reference's weight, for the JSON file."""
+    """Return the fitted parameters by name (value, std, unit) and the choice of the reference's weight, for the JSON file."""
     if calibration is None:
         return {}
     tried = [{"weight": weight, "sideslip_rmse_deg": rmse} for weight, rmse in calibration.validation]
@@ -117,32 +119,32 @@ def fitted_parameters(calibration: Calibration | None) -> dict[str, Any]:
 
 
 def reference_in_words(calibration: Calibration, uses: tuple[str, ...]) -> str | None:
-    """What validation made of a reference that was offered; None where none was."""
+    """Describe how validation decided on the reference; None if there was no reference."""
     if not uses:
         return None
     if calibration.weight is None:
-        return f"{uses[0]} was not used: the fit without it was the best on the second half of what was calibrated on."
+        return f"{uses[0]} was not used: the fit without it was the best on the second half of the calibration span."
     return f"{uses[0]} was followed to within {np.degrees(calibration.weight):.1f} degrees, which was best on the second half."
 
 
 def untold_in_words(calibration: Calibration) -> str | None:
-    """Of what the logs say little; None where they tell all."""
+    """Describe the parameters about which the logs contain little information; None if there are none."""
     names = [estimators.kit.in_words(name) for name in sideslip.little_told(calibration)]
     if not names:
         return None
-    they = "it is" if len(names) == 1 else "they are"
-    return f"What was logged says little of {', '.join(names)}: {they} near what was likely beforehand; bands allow for it."
+    they = "it stays near its prior" if len(names) == 1 else "they stay near their priors"
+    return f"The logs contain little information about {', '.join(names)}: {they}; the bands allow for it."
 
 
 def fitted_car(calibration: Calibration, car: CarSpecification, parts: Sequence[Recording]) -> CarSpecification:
-    """The specification with the values fitted to `parts` in place."""
+    """Return the specification with the values fitted to `parts`."""
     return sideslip.fitted_car(calibration, car, recording=parts)
 
 
 def curves(
     calibration: Calibration, car: CarSpecification, fitted: CarSpecification, part: Recording
 ) -> tuple[dict, dict]:
-    """Cars before and after, and the slip angles that a log visited, for `plots.force_curves`."""
+    """Return the cars before and after the fit, and the slip angles that a log covers, for `plots.force_curves`."""
     cars = {"car file": vehicles.from_specification(car), "fitted": vehicles.from_specification(fitted)}
     found = estimate(calibration, part)
     v_x, yaw_rate = np.asarray(part["v_x"]), np.asarray(part["yaw_rate"])

@@ -1,4 +1,4 @@
-"""`jaxveh simulate`: a drive as sensors would have seen it, with the truth beside."""
+"""`jaxveh simulate`: simulate the measurements of a drive, together with the truth."""
 
 from __future__ import annotations
 
@@ -27,22 +27,24 @@ PRODUCT = typer.Option(
 VEHICLE = typer.Option(
     "--vehicle", metavar="CAR", help=f"A car file (jaxveh schema car), or one of {', '.join(BUILT_IN)}."
 )
-FIDELITY = typer.Option(
-    "--fidelity", metavar="NAME", help=f"What is made of the car: {', '.join(vehicles.kit.FIDELITIES)}."
-)
-MANOEUVRE = typer.Option("--manoeuvre", metavar="NAME", help="What the driver does (--list).")
+FIDELITY = typer.Option("--fidelity", metavar="NAME", help=f"The vehicle model: {', '.join(vehicles.kit.FIDELITIES)}.")
+MANOEUVRE = typer.Option("--manoeuvre", metavar="NAME", help="The manoeuvre (--list shows all).")
 ROAD = typer.Option("--road", metavar="ROAD", help=f"A road file (.toml), or one of {', '.join(roads.ROADS)}.")
-FITTED = typer.Option("--devices", metavar="NAME", help=f"What measures: {', '.join(DEVICES)}.")
-SOLVER = typer.Option("--solver", metavar="NAME", help=f"{', '.join(simulation.kit.SOLVERS)}.")
-UNTIL = typer.Option("--until", metavar="EVENT", help=f"End early at {' or '.join(EVENTS)}.", show_default=False)
+FITTED = typer.Option("--devices", metavar="NAME", help=f"The measuring devices: {', '.join(DEVICES)}.")
+SOLVER = typer.Option("--solver", metavar="NAME", help=f"The ODE solver: {', '.join(simulation.kit.SOLVERS)}.")
+UNTIL = typer.Option(
+    "--until", metavar="EVENT", help=f"End early at this event: {' or '.join(EVENTS)}.", show_default=False
+)
 SET = typer.Option(
     "--set", metavar="NAME=VALUE", help="An option of the manoeuvre (--list); repeatable.", show_default=False
 )
-SPEED = typer.Option("--speed", help="m/s; usual for the manoeuvre unless given.", show_default=False)
+SPEED = typer.Option("--speed", help="Speed, m/s; by default the manoeuvre's usual speed.", show_default=False)
 STEER = typer.Option(
-    "--steer-deg", help="Amplitude at the road wheels, degrees, left positive; usual unless given.", show_default=False
+    "--steer-deg",
+    help="Steer amplitude at the road wheels, degrees, left positive; by default usual.",
+    show_default=False,
 )
-DURATION = typer.Option("--duration", help="s; the manoeuvre's own unless given.", show_default=False)
+DURATION = typer.Option("--duration", help="Duration, s; by default the manoeuvre's own.", show_default=False)
 LIST = typer.Option("--list", help="Show vehicles, manoeuvres with their options, roads and devices, and stop.")
 
 
@@ -57,7 +59,7 @@ def simulate(
     settings: Annotated[list[str] | None, SET] = None,
     road: Annotated[str, ROAD] = "level",
     devices: Annotated[str, FITTED] = "esc",
-    rate: Annotated[float, typer.Option("--rate", help="Rows a second, Hz; devices have rates of their own.")] = 100.0,
+    rate: Annotated[float, typer.Option("--rate", help="Rows per second, Hz; devices have their own rates.")] = 100.0,
     yaw_rate_std: Annotated[float, typer.Option("--yaw-rate-std", help="Noise of esc's yaw rate, rad/s.")] = 0.005,
     a_y_std: Annotated[float, typer.Option("--a-y-std", help="Noise of esc's lateral acceleration, m/s^2.")] = 0.1,
     solver: Annotated[str, SOLVER] = "auto",
@@ -70,15 +72,15 @@ def simulate(
 ) -> None:
     """Simulate a drive and write it as a recording: measured channels, inputs, and the truth as `true.<channel>`.
 
-    The numbers that the manoeuvre's standard asks for are printed. --out draws the manoeuvre's own figure, the drive from
-    above, the wheel loads and the channels. --list shows what there is.
+    The numbers that the manoeuvre's standard defines are printed. --out draws the manoeuvre's own figure, a top view of the
+    drive, the wheel loads and the channels. --list shows all vehicles, manoeuvres, roads and devices.
 
     A step of the steering, with its figures: [bold]jaxveh simulate --manoeuvre step-steer --steer-deg 3 -o step.csv --out figs[/]
 
     The lane change of ISO 3888-1 on four wheels: [bold]jaxveh simulate --manoeuvre iso-lane-change --fidelity two-track-3dof
     --set preview_time=0.7 --out figures[/]
 
-    Braking on ice to standstill, as the devices of a series car see it: [bold]jaxveh simulate --manoeuvre mu-jump-braking
+    Braking on ice to standstill, measured by the devices of a series car: [bold]jaxveh simulate --manoeuvre mu-jump-braking
     --fidelity seven-dof --road ice --until standstill --devices production --duration 40 -o brake.mf4[/]
     """
     if listed:
@@ -86,7 +88,7 @@ def simulate(
     _check(product, vehicle, road, devices, force, out, numbers, solver, until, rate)
     car = vehicle_of(vehicle, fidelity)
     asked = driving.parse_manoeuvre(manoeuvre, speed, steer_deg, duration, settings or (), car)
-    # The devices fold their numbers into a key: it must not be one of which the driver's or the road's is made.
+    # Each device folds its number into a key, which must differ from the keys of the driver and the road.
     drive_key, road_key, sensor_key = jax.random.split(jax.random.key(seed), 3)
     driver = driving.make(asked, drive_key)
     ground = None if road == "level" else roads.named_road(road, road_key)
@@ -116,10 +118,10 @@ def _summary(recording: Recording, product: Path | None) -> dict[str, Any]:
 
 
 def _check(product, vehicle, road, devices, force, out, numbers, solver, until, rate) -> None:
-    """Raise before any work for what could not be done or written in the end."""
+    """Raise `InputError`, before any work, for options that are wrong and files that could not be written in the end."""
     if product is None and out is None and numbers is None:
         raise InputError(
-            "simulate: nothing to write: give -o FILE, --out DIR or --json FILE (--list shows what there is)."
+            "simulate: nothing to write: give -o FILE, --out DIR or --json FILE (--list shows the choices)."
         )
     check_product(product, io.SUFFIXES, force, (Path(vehicle), Path(road)))
     check_report(out, numbers)
@@ -131,7 +133,7 @@ def _check(product, vehicle, road, devices, force, out, numbers, solver, until, 
 
 
 def _keep(recording: Recording, product: Path | None, asked: Any, car: Any, out: Path | None, force: bool) -> None:
-    """Write the recording and draw the figures where that is asked for, and say so."""
+    """Write the recording and draw the figures if they are wanted, and print their names."""
     if product is not None:
         io.write_recording(recording, product, overwrite=force)
         results().print(f"{product}: {len(recording)} rows, {', '.join(recording.names)}")
@@ -140,13 +142,16 @@ def _keep(recording: Recording, product: Path | None, asked: Any, car: Any, out:
 
 
 def _list() -> None:
-    """What there is to choose from."""
+    """Print the vehicles, fidelities, manoeuvres, roads and devices to choose from."""
     table(
-        "Vehicles (--vehicle)", ("name", "what"), [(name, first_line(make)) for name, make in BUILT_IN.items()], left=2
+        "Vehicles (--vehicle)",
+        ("name", "description"),
+        [(name, first_line(make)) for name, make in BUILT_IN.items()],
+        left=2,
     )
     table(
         "Fidelities (--fidelity)",
-        ("name", "what"),
+        ("name", "description"),
         [(name, first_line(kind)) for name, kind in vehicles.kit.FIDELITIES.items()],
         left=2,
     )
@@ -160,7 +165,7 @@ def _list() -> None:
         speed, steer = USUAL[name]
         usual = f"{speed:.3g} m/s" + (f", {steer:g}°" if steer else "")
         rows.append((name, one.help, usual, " ".join(settings)))
-    heads = ("name", "what", "usual", "options")
-    table("Manoeuvres (--manoeuvre), their usual speed and steer, and what can be --set", heads, rows, left=4)
-    table("Roads (--road)", ("name", "what"), [(name, one.help) for name, one in roads.ROADS.items()], left=2)
-    table("Devices (--devices)", ("name", "what"), [(name, one.help) for name, one in DEVICES.items()], left=2)
+    heads = ("name", "description", "usual", "options")
+    table("Manoeuvres (--manoeuvre), their usual speed and steer, and the options of --set", heads, rows, left=4)
+    table("Roads (--road)", ("name", "description"), [(name, one.help) for name, one in roads.ROADS.items()], left=2)
+    table("Devices (--devices)", ("name", "description"), [(name, one.help) for name, one in DEVICES.items()], left=2)

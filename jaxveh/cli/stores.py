@@ -1,4 +1,4 @@
-"""Options of programs whose sweeps can be stored: where, and who computes them."""
+"""Options of programs whose sweeps can be stored: the folder, and the workers that compute them."""
 
 from __future__ import annotations
 
@@ -18,45 +18,43 @@ Store = Annotated[
     typer.Option(
         "--store",
         metavar="FOLDER",
-        help="Write the sweeps into Zarr stores here, chunk by chunk; the same call goes on where it was, and computes nothing "
-        "twice that is there.",
+        help="Write the sweeps into Zarr stores in this folder, chunk by chunk. The same call continues an interrupted run; "
+        "stored chunks are not computed again.",
     ),
 ]
 
-Processes = Annotated[
-    int | None, typer.Option("--processes", help="Compute in so many processes of this machine.", min=1)
-]
+Processes = Annotated[int | None, typer.Option("--processes", help="Number of processes on this machine.", min=1)]
 
 Scheduler = Annotated[
     str | None,
     typer.Option(
         "--scheduler",
         metavar="ADDRESS",
-        help="Have the workers of a Dask scheduler (tcp://host:8786) compute, which see the store under the same path and have "
-        "the same versions and XLA_FLAGS.",
+        help="Compute on the workers of a Dask scheduler (tcp://host:8786). They must see the store under the same path, and "
+        "have the same versions and XLA_FLAGS.",
     ),
 ]
 
 
 def check_workers(processes: int | None, scheduler: str | None) -> None:
-    """Raise `InputError` where both kinds of workers are asked for."""
+    """Raise `InputError` if both kinds of workers are requested."""
     if processes is not None and scheduler is not None:
         raise InputError("--processes and --scheduler: give one of them, not both.")
 
 
 def stores_of(folder: Path | None, processes: int | None, scheduler: str | None) -> Stores | None:
-    """The stores that the options ask for; None where there are none.
+    """Return the stores that the options request; None if they request none.
 
-    Raises `InputError` before any work: for workers without a store, for both kinds of them, for a folder that is a file, and
-    where the extra `sweep` is missing.
+    Raises `InputError`, before any work: for workers without a store, for both kinds of workers, for a folder that is a file,
+    and if the extra `sweep` is missing.
     """
     asked = [name for name, value in (("--processes", processes), ("--scheduler", scheduler)) if value is not None]
     if folder is None:
         if asked:
-            raise InputError(f"{asked[0]}: is for sweeps that are stored; name a folder with --store, or leave it out.")
+            raise InputError(f"{asked[0]}: applies to stored sweeps; name a folder with --store, or leave it out.")
         return None
     check_workers(processes, scheduler)
-    # The nearest that is there is what the folder will be made in.
+    # The nearest existing parent, in which the folder will be created.
     there = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
     if not there.is_dir():
         raise InputError(

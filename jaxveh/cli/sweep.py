@@ -1,4 +1,4 @@
-"""`jaxveh sweep STUDY.toml`: a study over all that it varies, into a store; `jaxveh sweep show`: its tables and figures."""
+"""`jaxveh sweep STUDY.toml`: compute a study and store its numbers; `jaxveh sweep show`: its tables and figures."""
 
 from __future__ import annotations
 
@@ -21,20 +21,25 @@ if TYPE_CHECKING:
 SUFFIX = ".zarr"
 RUN = "run"
 
-STUDY = typer.Argument(metavar="STUDY.toml", help="What to vary (jaxveh schema study).", show_default=False)
+STUDY = typer.Argument(metavar="STUDY.toml", help="The study: what to vary (jaxveh schema study).", show_default=False)
 STORE = typer.Option(
-    "-o", metavar="STORE.zarr", help="Where the numbers go; one that is begun goes on.", show_default=False
+    "-o", metavar="STORE.zarr", help="The store of the numbers; an unfinished store is continued.", show_default=False
 )
 PART = typer.Option(
-    "--part", metavar="I/N", help="One share of the chunks, 0/8 to 7/8, for an array of jobs.", show_default=False
+    "--part",
+    metavar="I/N",
+    help="Compute one share of the chunks, 0/8 to 7/8, for an array of jobs.",
+    show_default=False,
 )
-BATCH = typer.Option("--batch", metavar="RUNS", help="Runs of a chunk, computed at a time.", min=1, show_default=False)
-VALUES = typer.Option("--value", metavar="NAME", help="Show this value alone; repeatable.", show_default=False)
+BATCH = typer.Option(
+    "--batch", metavar="RUNS", help="Runs per chunk; a chunk is computed at once.", min=1, show_default=False
+)
+VALUES = typer.Option("--value", metavar="NAME", help="Show only this value; repeatable.", show_default=False)
 LIST = typer.Option("--list", help="Show estimators, filters and metrics, and stop.")
 
 
 class RunUnlessNamed(TyperGroup):
-    """A group whose first word may be left out: what is no command is what `run` takes."""
+    """A group whose command may be omitted: arguments without a command are those of `run`."""
 
     def parse_args(self, ctx, args):
         if args and args[0] not in self.commands and args[0] not in ctx.help_option_names:
@@ -53,11 +58,11 @@ def run(
     numbers: options.Numbers = None,
     listed: Annotated[bool, LIST] = False,
 ) -> None:
-    """Simulate, estimate and measure every combination of what a study varies, each with the same seeds.
+    """Simulate, estimate and score every combination of the settings that a study varies, each with the same seeds.
 
-    The store is Zarr, which xarray opens. What is in it is never computed again: a sweep that was killed goes on where it was
-    when it is started again, and another study in the same store is refused by name. Tables are printed at the end; --out
-    draws figures; [bold]jaxveh sweep show STORE.zarr[/] does both again.
+    The store is a Zarr store, which xarray opens. Stored chunks are never computed again: a killed sweep continues when it is
+    started again. A store of another study is refused, with the difference. Tables are printed at the end, and --out draws
+    figures; [bold]jaxveh sweep show STORE.zarr[/] does both again.
 
     Begin with: [bold]jaxveh schema study > study.toml; jaxveh sweep study.toml -o study.zarr --processes 2 --out figures[/]
     """
@@ -83,7 +88,7 @@ def run(
         )  # fmt: skip
     if share is not None:
         results().print(
-            f"{store}: the share {part} is done; jaxveh sweep show tells all when every share is", markup=False
+            f"{store}: the share {part} is done; when all shares are, jaxveh sweep show prints the tables", markup=False
         )
         return
     _tell(found, store, (), out, numbers, {"study": study, "store": store})
@@ -95,10 +100,10 @@ def show(
     out: options.Out = None,
     numbers: options.Numbers = None,
 ) -> None:
-    """Print the tables of a sweep's store, and draw its figures with --out: of whatever was swept, by a study or from Python.
+    """Print the tables of a sweep's store, and draw its figures with --out; the sweep may be of a study or from Python.
 
-    Medians and quartiles by each axis; errors (rmse, worst, final, crps) against doing nothing, of each choice against the
-    first on the same drives, and ranked.
+    The tables have medians and quartiles along each axis. Errors (rmse, worst, final, crps) are compared with doing nothing,
+    and each choice with the first on the same drives; the choices are ranked.
 
     Example: [bold]jaxveh sweep show study.zarr --out figures --value rmse.sideslip[/]
     """
@@ -112,12 +117,12 @@ def show(
 
 
 def _check(study: Path | None, store: Path | None) -> tuple[Path, Path]:
-    """Both files, or an error before any work."""
+    """Return both paths; raise `InputError`, before any work, if one is missing or wrong."""
     if study is None:
         raise InputError("sweep: STUDY.toml is missing (jaxveh schema study prints one).")
     if store is None:
         raise InputError(
-            "sweep: -o STORE.zarr is missing: where the numbers go, and from where a killed sweep goes on."
+            "sweep: -o STORE.zarr is missing: the store of the numbers, from which a killed sweep continues."
         )
     if store.suffix.lower() != SUFFIX:
         raise InputError(f"-o {store}: suffix {store.suffix!r}; it must end in {SUFFIX}.")
@@ -126,7 +131,7 @@ def _check(study: Path | None, store: Path | None) -> tuple[Path, Path]:
 
 
 def _part(text: str | None) -> tuple[int, int] | None:
-    """I/N as numbers."""
+    """Return I/N as numbers."""
     if text is None:
         return None
     share, slash, of = text.partition("/")
@@ -168,14 +173,14 @@ def _tell(
 
 
 def _list() -> None:
-    """What a study can name beside what `jaxveh simulate --list` shows."""
+    """Print the names that a study can use, in addition to those of `jaxveh simulate --list`."""
     from jaxveh import studies
     from jaxveh.cli.vehicle import first_line
 
     rows = [(name, one.help, " ".join(one.options)) for name, one in studies.ESTIMATORS.items()]
-    table("Estimators ([estimator] name)", ("name", "what", "further keys"), rows, left=3)
+    table("Estimators ([estimator] name)", ("name", "description", "further keys"), rows, left=3)
     rows = [(name, first_line(kind), " ".join(studies.filter_options(name))) for name, kind in studies.FILTERS.items()]
-    table("Filters ([filter] name)", ("name", "what", "further keys"), rows, left=3)
+    table("Filters ([filter] name)", ("name", "description", "further keys"), rows, left=3)
     rows = [(f"{name}.QUANTITY" if one.of_quantity else name, one.help) for name, one in studies.METRICS.items()]
-    table("Metrics ([metrics] names)", ("name", "what"), rows, left=2)
+    table("Metrics ([metrics] names)", ("name", "description"), rows, left=2)
     results().print("Vehicles, fidelities, manoeuvres with their options, roads and devices: jaxveh simulate --list")

@@ -1,4 +1,4 @@
-"""`jaxveh tyre`: tyre property files: what is in one, and tables of inputs through it."""
+"""`jaxveh tyre`: show the contents of tyre property files, and evaluate them for tables of inputs."""
 
 from __future__ import annotations
 
@@ -21,19 +21,20 @@ from jaxveh.tyres import kit
 TYRE = typer.Argument(metavar="FILE", help="A tyre property file (.tir).", show_default=False)
 PRODUCT = typer.Option("-o", metavar="FILE", help="The outputs: .csv.", show_default=False)
 LOADS = (0.5, 1.0, 1.5)
-"""Shares of the nominal load that `show` tells of."""
+"""Loads in the table of `show`, relative to the nominal load."""
 
 
 class Axes(StrEnum):
-    """Signs of slip angle and cornering stiffness."""
+    """The sign convention of slip angle and cornering stiffness."""
 
     iso_w = "iso-w"
     ours = "ours"
 
 
 def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.Numbers = None) -> None:
-    """Show what a tyre property file says: version, ranges, what the tyre does at half, nominal and 1.5 times load, and what
-    is odd about the file. --out draws forces over slip, the friction ellipse, and where each coefficient is seen.
+    """Show the contents of a tyre property file: version, ranges, the tyre at 0.5, 1 and 1.5 times the nominal load, findings.
+
+    --out draws forces over slip, the friction ellipse, and the slips at which each coefficient affects the forces.
 
     Example: [bold]jaxveh tyre show tyre.tir --out figures[/]
     """
@@ -42,7 +43,7 @@ def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.
     tyre = tyres.from_property_file(source)
     s, r = tyre.structure, tyre.ranges
     head = (
-        f"{file}: MF-Tyre {tyre.version / 10:g}, side {source.text('TYRESIDE', 'not told')}, "
+        f"{file}: MF-Tyre {tyre.version / 10:g}, side {source.text('TYRESIDE', 'not given')}, "
         f"radius {float(s.UNLOADED_RADIUS):g} m, "
         f"nominal load {float(s.FNOMIN):g} N, pressure {float(s.NOMPRES) / 1e5:g} bar, measured at {float(s.LONGVL):g} m/s"
     )
@@ -54,7 +55,7 @@ def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.
         "load, N": (r.FZMIN, r.FZMAX, 1.0),
     }
     rows = [(name, number(float(low) * unit), number(float(high) * unit)) for name, (low, high, unit) in ranges.items()]
-    table("Measured from .. to", ("quantity", "from", "to"), rows)
+    table("Measured ranges", ("quantity", "from", "to"), rows)
     found = _free_rolling(tyre, jnp.asarray(LOADS, s.FNOMIN.dtype) * s.FNOMIN)
     quantities = {
         "friction along, -": "mu_x", "friction across, -": "mu_y", "slip stiffness, N": "K_xk",
@@ -65,7 +66,7 @@ def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.
     table("Free rolling, at loads in N", ("quantity", *[f"{share * float(s.FNOMIN):g}" for share in LOADS]), rows)
     findings = tyres.check_property_file(source)
     if findings:
-        table("Worth a look", ("about", "what"), findings, left=2)
+        table("Findings about the file", ("about", "finding"), findings, left=2)
     shown: dict[str, Any] = {
         "version": tyre.version,
         "loads": [share * float(s.FNOMIN) for share in LOADS],
@@ -78,7 +79,7 @@ def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.
 
 
 def _free_rolling(tyre: tyres.MFTyre, load: jax.Array) -> dict[str, list[float]]:
-    """All outputs at these loads, by name."""
+    """Return all outputs at these loads, by name."""
     found = _outputs(tyre, tyres.Contact(load=load))
     return {name: np.broadcast_to(value, load.shape).tolist() for name, value in found._asdict().items()}
 
@@ -103,7 +104,7 @@ def _draw(tyre: tyres.MFTyre, out: Path) -> None:
 
 
 def _coefficients(tyre: tyres.MFTyre) -> tuple:
-    """What carries stiffness, friction and combined slip, of either force."""
+    """Return the coefficients of stiffness, friction and combined slip for the longitudinal and the lateral force."""
     along, across = tyre.longitudinal, tyre.lateral
     return along.PKX1, across.PKY1, along.PDX1, across.PDY1, along.RBX1, across.RBY1
 
@@ -115,11 +116,11 @@ def evaluate_table(
     axes: Annotated[Axes, typer.Option("--axes", help="Signs of slip angle and cornering stiffness.")] = Axes.iso_w,
     force: options.Force = False,
 ) -> None:
-    """Evaluate a tyre for each row of a table, by column name.
+    """Evaluate a tyre for each row of a table, whose columns are found by name.
 
-    Columns: in_Fz, in_kappa, in_alpha, in_gamma, in_Vx, in_P (or without in_) in N, -, rad, rad, m/s, Pa; useMode where the
-    table has it (111, 121, 211, 221). With --axes iso-w a positive slip angle gives a negative force, with --axes ours a
-    positive one. Outputs have the reference evaluator's names.
+    Columns: in_Fz, in_kappa, in_alpha, in_gamma, in_Vx, in_P (or without in_) in N, -, rad, rad, m/s, Pa, and optionally
+    useMode (111, 121, 211, 221). With --axes iso-w a positive slip angle gives a negative force, with --axes ours a
+    positive one. Outputs have the names of the reference evaluator.
 
     Example: [bold]jaxveh tyre evaluate tyre.tir inputs.csv -o outputs.csv --axes iso-w[/]
     """
@@ -146,7 +147,7 @@ def _read(path: Path) -> Any:
     try:
         frame = pd.read_csv(path)
     except (pd.errors.ParserError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is no table in CSV ({error}).") from None
+        raise InputError(f"{path}: is not a CSV table ({error}).") from None
     for name in filter(_is_wanted, frame):
         if not pd.api.types.is_numeric_dtype(frame[name]):
             bad = pd.to_numeric(frame[name], errors="coerce").isna().to_numpy().argmax()
@@ -155,7 +156,7 @@ def _read(path: Path) -> Any:
 
 
 def _say_what_is_beyond(tyre: tyres.MFTyre, found: dict[str, np.ndarray]) -> None:
-    """Tell of rows beyond the range in which the tyre was measured; there the reference, and we, hold its edge."""
+    """Warn of rows beyond the measured range; the model, like the reference evaluator, limits their inputs to the range."""
     r = tyre.ranges
     for name, low, high in (
         ("kappa", r.KPUMIN, r.KPUMAX), ("alpha", r.ALPMIN, r.ALPMAX), ("gamma", r.CAMMIN, r.CAMMAX), ("Fz", r.FZMIN, r.FZMAX),

@@ -1,4 +1,4 @@
-"""`jaxveh tyre fit`: a tyre fitted to rig data."""
+"""`jaxveh tyre fit`: fit a tyre to rig data."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SHAPE_OF_BOUNDS, SHAPE_OF_WEIGHT = "NAME=LOW:HIGH, such as PCY1=1:2", "CHANNEL=N
 
 
 class Axes(StrEnum):
-    """In which signs rig data are."""
+    """The sign convention of rig data."""
 
     sae = "sae"
     adapted_sae = "adapted-sae"
@@ -33,7 +33,7 @@ class Axes(StrEnum):
 
 
 class Side(StrEnum):
-    """On which side of a car the tyre was measured."""
+    """The side of the car on which the tyre was measured."""
 
     left = "left"
     right = "right"
@@ -44,17 +44,19 @@ DATA = typer.Argument(
     show_default=False,
     help="Rig data: .csv, the FSAE TTC's files (.dat, .txt, .csv, .mat) or TYDEX (.tdx, .tyd, .tydex); each file is a run.",
 )
-PRODUCT = typer.Option("-o", metavar="FILE", show_default=False, help="The tyre: .tir for MF-Tyre, .toml for others.")
+PRODUCT = typer.Option(
+    "-o", metavar="FILE", show_default=False, help="The tyre file: .tir for MF-Tyre, .toml for other laws."
+)
 MODEL = typer.Option(
     "--model",
     metavar="LAW",
-    help=f"The law, started from what the data show: {', '.join(fitting_kit.RIG_STARTS)} ({DEFAULT} by default).",
+    help=f"The tyre law, with start values from the data: {', '.join(fitting_kit.RIG_STARTS)} ({DEFAULT} by default).",
 )
 START = typer.Option(
     "--start",
     metavar="FILE",
-    help="Start from this tyre instead of --model: a property file (.tir), of which -o keeps comments, units and all that is "
-    "not fitted, or a parameter file (.toml) that this program wrote.",
+    help="Start from this tyre instead of --model: a property file (.tir), whose comments, units and coefficients that are not "
+    "fitted are copied to -o, or a parameter file (.toml) that this program wrote.",
 )
 AXES = typer.Option(
     "--axes",
@@ -66,30 +68,33 @@ AXES = typer.Option(
 CHANNELS = typer.Option(
     "--measured",
     metavar="F_x,F_y,...",
-    help=f"Compare these alone, of {', '.join(io_kit.RIG_CHANNELS)}; by default all there are.",
+    help=f"Fit only these channels of {', '.join(io_kit.RIG_CHANNELS)}; by default all that the data have.",
 )
-BOUNDS = typer.Option("--bounds", metavar="NAME=LOW:HIGH", help="Keep a coefficient inside; repeatable.")
+BOUNDS = typer.Option("--bounds", metavar="NAME=LOW:HIGH", help="Keep a coefficient within these bounds; repeatable.")
 WEIGHT = typer.Option(
-    "--weight", metavar="CHANNEL=NUMBER", help="Count a channel so many times what its noise says; repeatable."
+    "--weight", metavar="CHANNEL=NUMBER", help="Multiply a channel's weight, which its noise sets, by this; repeatable."
 )
 FREE = typer.Option(
     "--free",
     metavar="NAME",
-    help="Fit a coefficient too that is held unless asked: PKY4, the form of the cornering stiffness over load; repeatable.",
+    help="Also fit a coefficient that is held by default: PKY4, the form of the cornering stiffness over load; repeatable.",
 )
 ROBUST = typer.Option(
     "--robust",
-    help="For data with outliers: residuals are taken for Student's t with 4 degrees of freedom, on their median size's scale.",
+    help="For data with outliers: residuals follow Student's t with 4 degrees of freedom, with a scale from their median size.",
 )
 FOLDS = typer.Option(
-    "--folds", metavar="N", min=0, help="Cross-validate: fit N times without a part, and score it on that part."
+    "--folds",
+    metavar="N",
+    min=0,
+    help="Cross-validate: N times, leave out a part of the data, fit the rest, score that part.",
 )
-SIDE = typer.Option("--side", help="TYRESIDE of a new .tir file; --start has its own.")
+SIDE = typer.Option("--side", help="TYRESIDE of a new .tir file; a --start file has its own.")
 
 
 @dataclasses.dataclass(frozen=True)
 class Origin:
-    """Where a fit starts: the name of a `model`, or the `tyre` of --start, and the property `file` that it came from."""
+    """The start of a fit: the name of a `model`, or the `tyre` of --start and the property `file` that it came from."""
 
     model: str | None = None
     tyre: tyres.AbstractTyre | None = None
@@ -120,15 +125,16 @@ def fit_table(
 ) -> None:
     """Fit a tyre to rig data, and write it as a property file (MF-Tyre) or a parameter file (other laws).
 
-    CSV: columns Fz, alpha, kappa, gamma, Vx, P and what was measured, Fx, Fy, Mx, My, Mz, in SI units and radians, or with the
+    CSV: columns Fz, alpha, kappa, gamma, Vx, P and the measurements Fx, Fy, Mx, My, Mz, in SI units and radians, or with the
     unit in the name, such as alpha \\[deg]; Fz, a slip and a measurement are needed. A column run numbers sweeps for --folds.
-    Files of the Formula SAE Tire Test Consortium are read as they are: SA, SL, IA, FZ, ..., metric or US units by their line of
+    Files of the Formula SAE Tire Test Consortium are read unchanged: SA, SL, IA, FZ, ..., metric or US units by their line of
     units, in SAE's axes. Slopes that no tyre has (F_y over slip angle and camber, F_x over slip ratio, M_z over slip angle)
-    tell that the axes are others: they are refused, or with --start, which says what tyre it is, reported.
+    show that the data have other axes: such data are refused, or, with --start, which defines the tyre, a warning is printed.
 
-    MF-Tyre is fitted in stages over the coefficients that the data show, then in all; standard errors tell how far each can be
-    believed. What the data do not identify stays at its start. Of tyres that are the same by other signs (of RBY2, say) one
-    form is written. --out draws residuals over slip and load. Where residuals have heavier tails than noise, try --robust.
+    MF-Tyre is fitted in stages over the coefficients that the data excite, then over all of them together; each coefficient has
+    a standard error. Coefficients that the data do not identify keep their start values. If several sets of signs (of RBY2, say)
+    give the same tyre, one form is written. --out draws residuals over slip and load. If residuals have heavier tails than
+    noise, try --robust.
 
     Example: [bold]jaxveh tyre fit lateral.csv braking.csv --model mf61 --side left --folds 5 --out figures -o tyre.tir[/]
 
@@ -167,7 +173,7 @@ def _origin(model: str | None, start: Path | None) -> Origin:
         check_one_of("--model", model, tuple(fitting_kit.RIG_STARTS))
         return Origin(model)
     if model is not None:
-        raise InputError(f"--model {model}: --start {start} tells the law; leave one of the two out.")
+        raise InputError(f"--model {model}: --start {start} defines the law; leave one of the two out.")
     if start.suffix.lower() == ".tir":
         file = io.read_property_file(start)
         return Origin(tyre=tyres.from_property_file(file), file=file)
@@ -178,13 +184,13 @@ def _origin(model: str | None, start: Path | None) -> Origin:
 
 def _check_side(side: Side | None, origin: Origin) -> None:
     if side is not None and origin.file is not None:
-        raise InputError(f"--side {side.value}: {origin.file.source} tells its own side; leave --side out.")
+        raise InputError(f"--side {side.value}: {origin.file.source} has its own side; leave --side out.")
     if side is not None and not origin.is_mf_tyre:
-        raise InputError(f"--side {side.value}: only a property file (.tir) tells a side; leave --side out.")
+        raise InputError(f"--side {side.value}: only a property file (.tir) has a side; leave --side out.")
 
 
 def _law(origin: Origin, rig: io.RigTable) -> tyres.AbstractTyre:
-    """The tyre to start from; of a property file with ranges that hold the data, and a word about it and about odd signs."""
+    """Return the tyre to start from; with --start warn of odd signs, and widen a property file's ranges to the data."""
     if origin.model is not None:
         return fitting.starting_tyre(origin.model, rig)
     for wrong in fitting.wrong_signs(rig):
@@ -195,21 +201,21 @@ def _law(origin: Origin, rig: io.RigTable) -> tyres.AbstractTyre:
         law, widened = fitting_kit.widened_ranges(law, rig)
         if widened:
             listed = ", ".join(f"{one.name} from {one.before:g} to {one.after:g}" for one in widened)
-            say("warning", "yellow", f"ranges of --start are widened, to hold the data: {listed}")
+            say("warning", "yellow", f"ranges of --start are widened to contain the data: {listed}")
     return law
 
 
 def _write(
     fit: fitting.RigFit, rig: io.RigTable, origin: Origin, side: Side | None, note: str, product: Path, force: bool
 ) -> list[tyres.PropertyFinding]:
-    """Write the tyre; what is worth a look in a property file."""
+    """Write the tyre; return the findings about a property file."""
     tyre = fit.tyre
     if not isinstance(tyre, tyres.MFTyre):
         tyres.write_parameters(tyre, product, note=note, overwrite=force)
         return []
     if origin.file is None:
         tyre = fitting_kit.measured_ranges(tyre, rig)
-        note += "\nAn ordinary tyre's, not from these data: radius, stiffness, contact patch, coefficients that do not show."
+        note += "\nValues of an ordinary tyre, not fitted: radius, stiffness, contact patch, coefficients the data do not excite."
     file = tyres.to_property_file(tyre, like=origin.file, side=None if side is None else side.value, note=note)
     io.write_property_file(file, product, overwrite=force)
     return tyres.check_property_file(file)
@@ -229,7 +235,7 @@ def _channels(text: str | None) -> tuple[str, ...] | None:
         return None
     found = tuple(name.strip() for name in text.split(",") if name.strip())
     if not found:
-        raise InputError(f"--measured {text!r}: must name one of {', '.join(io_kit.RIG_CHANNELS)}.")
+        raise InputError(f"--measured {text!r}: must name at least one of {', '.join(io_kit.RIG_CHANNELS)}.")
     for name in found:
         check_one_of("--measured", name, io_kit.RIG_CHANNELS)
     return tuple(dict.fromkeys(found))
@@ -242,7 +248,7 @@ def _bounds(texts: list[str] | None) -> dict[str, tuple[float, float]]:
         low, _, high = ends.partition(":")
         bounds = tuple(_number(end, "--bounds", text, SHAPE_OF_BOUNDS) for end in (low, high))
         if not bounds[0] < bounds[1]:
-            raise InputError(f"--bounds {text}: {low} must lie below {high}.")
+            raise InputError(f"--bounds {text}: {low} must be less than {high}.")
         found[name.strip()] = bounds
     return found
 
@@ -266,7 +272,7 @@ def _number(value: str, option: str, text: str, shape: str) -> float:
 
 
 def _full_name(law: tyres.AbstractTyre, name: str) -> str:
-    """`lateral.PCY1` for `PCY1`, as property files call it; other names as they are."""
+    """Return `lateral.PCY1` for `PCY1`, the name in property files; other names unchanged."""
     for section, part in vars(law).items():
         if isinstance(part, eqx.Module) and name in vars(part):
             return f"{section}.{name}"

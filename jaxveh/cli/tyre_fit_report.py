@@ -1,4 +1,4 @@
-"""What `jaxveh tyre fit` says of a fit: stages, channels, coefficients, and what to be careful with."""
+"""The report of `jaxveh tyre fit`: stages, channels, coefficients and warnings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jaxveh.cli.failure import say
 from jaxveh.fitting import RigFit, heavy_tails, kit
 
 UNCERTAIN = 0.2
-"""Standard error over a coefficient's own size above which it is marked."""
+"""A coefficient is marked if its standard error exceeds this share of its size."""
 
 UNITS = {"F_x": "N", "F_y": "N", "M_x": "N m", "M_y": "N m", "M_z": "N m"}
 
@@ -23,15 +23,17 @@ UNSEEN, WEAK, SET = "not identified", "uncertain", "held"
 def show(
     fit: RigFit, start: tyres.AbstractTyre, findings: list[tyres.PropertyFinding], robust: bool = False
 ) -> dict[str, Any]:
-    """Print tables and warnings; returns every number for the JSON file. `start`: the tyre before the fit; `robust`: as in
-    `fit_rig`."""
+    """Print tables and warnings; return every number for the JSON file.
+
+    `start`: the tyre before the fit; `robust`: the option of `fit_rig`.
+    """
     share = fit.parameters_std.array() / _sizes(fit)
     marks = [_mark(name, one) for name, one in zip(fit.names, share, strict=True)]
     _stages(fit)
     _channels(fit)
     _coefficients(fit, start, share, marks)
     if findings:
-        table("Worth a look in the fitted file", ("about", "what"), findings, left=2)
+        table("Findings about the fitted file", ("about", "finding"), findings, left=2)
     warnings = warnings_of(fit, robust)
     for warning in warnings:
         say("warning", "yellow", warning)
@@ -66,11 +68,11 @@ def _stages(fit: RigFit) -> None:
         for s in fit.stages
     ]  # fmt: skip
     heads = ("stage", "rows", "coefficients", "before, % of peak", "after, % of peak", "steps", "end")
-    table("Stages: RMS of residuals over the peaks of what is measured", heads, rows)
+    table("Stages: RMS of residuals relative to the measured peaks", heads, rows)
 
 
 def _channels(fit: RigFit) -> None:
-    """The start's RMSE is what doing nothing gives."""
+    """Print the RMSE of each channel; that of the start is the do-nothing baseline."""
     validated = any(np.isfinite(value) for value in fit.cross_validation.values())
     heads = ["channel", "unit", "peak", "RMSE at the start", "fitted", "% of peak"]
     rows = [
@@ -89,14 +91,14 @@ def _coefficients(fit: RigFit, start, share: np.ndarray, marks: list[str]) -> No
     ]
     heads = ("coefficient", "unit", "start", "fitted", "standard error", "% of its size", "")
     note = (
-        f"The size of a coefficient that may be zero is its usual one; above {UNCERTAIN:.0%} of it: {WEAK}. "
-        f"What is {UNSEEN} stands at its start, and so does what is {SET} unless asked (--free)."
+        f"The size of a coefficient that may be zero is its usual size; above {UNCERTAIN:.0%} of it: {WEAK}. "
+        f"Coefficients that are {UNSEEN}, and those that are {SET} (see --free), keep their start values."
     )
     table("Coefficients", heads, rows, note, left=2)
 
 
 def warnings_of(fit: RigFit, robust: bool = False) -> list[str]:
-    """What whoever uses the tyre should know; `robust`: outliers counted little already."""
+    """Return warnings for the user of the tyre; `robust`: whether the fit gave outliers little weight."""
     found = []
     stopped = [stage.name for stage in fit.stages[:-1] if not stage.converged]
     if not fit.stages[-1].converged:
@@ -109,7 +111,7 @@ def warnings_of(fit: RigFit, robust: bool = False) -> list[str]:
     unseen = [name for name in still if name not in kit.HELD_COEFFICIENTS]
     if fit.identified < len(fit.names) - (len(still) - len(unseen)):
         found.append(
-            f"the data tell {fit.identified} of {len(fit.names)} directions of the coefficients apart"
+            f"the data identify {fit.identified} of {len(fit.names)} directions of the coefficients"
             + (f"; held at their start: {', '.join(unseen)}" if unseen else "")
         )
     worse = [name for name in fit.rmse if fit.rmse[name] > fit.start_rmse[name]]
@@ -118,43 +120,43 @@ def warnings_of(fit: RigFit, robust: bool = False) -> list[str]:
     exact = [name for name in fit.rmse if fit.rmse[name] < kit.LEAST_NOISE * fit.peak[name]]
     if exact:
         found.append(
-            f"met to the last digits: {', '.join(exact)}: computed data, or as few distinct values as coefficients; "
-            "no measure of how well the law predicts"
+            f"fitted to the last digits: {', '.join(exact)}: computed data, or as few distinct values as coefficients; "
+            "this does not measure how well the law predicts"
         )
     found += [_tails_in_words(name, fit.residuals[name], robust) for name in fit.residuals if name not in exact]
     found = [one for one in found if one]
     missed = [name for name in fit.rmse if fit.cross_validation[name] > 2 * fit.rmse[name]]
     if missed:
-        found.append(f"rows that a fold did not see are missed by more than twice the fit's RMSE: {', '.join(missed)}")
+        found.append(f"errors on rows left out in a fold are more than twice the fit's RMSE: {', '.join(missed)}")
     return found
 
 
 def _mark(name: str, share: float) -> str:
-    """What to say of a coefficient whose standard error is this share of its size."""
+    """Return the mark of a coefficient whose standard error is this share of its size."""
     if np.isnan(share):
         return SET if name in kit.HELD_COEFFICIENTS else UNSEEN
     return WEAK if share > UNCERTAIN else ""
 
 
 def _tails_in_words(name: str, residual: np.ndarray, robust: bool) -> str:
-    """What heavy tails of a channel's residuals mean; nothing where there are none."""
+    """Describe heavy tails of a channel's residuals; the text is empty if there are none."""
     tails = heavy_tails(residual)
     if tails is None:
         return ""
     if robust:
         return (
             f"{name}: {100 * tails.share:.2g} % of the rows lie beyond {kit.FAR_RESIDUAL:g} standard deviations of the others "
-            f"({number(tails.deviation)} {UNITS[name]}) and counted little: outliers, or what the law cannot meet"
+            f"({number(tails.deviation)} {UNITS[name]}) and had little weight: outliers, or rows that the law cannot fit"
         )
     return (
         f"{name}: residuals have heavy tails: {100 * tails.share:.2g} % of the rows lie beyond {kit.FAR_RESIDUAL:g} standard "
-        f"deviations ({number(tails.deviation)} {UNITS[name]} by their median size; of noise 0.006 %), and their RMS is "
-        f"{tails.ratio:.2g} of them: outliers, which pull the fit, or rows that the law cannot meet; compare with --robust"
+        f"deviations ({number(tails.deviation)} {UNITS[name]} by their median size; 0.006 % for Gaussian noise), and their RMS "
+        f"is {tails.ratio:.2g} standard deviations: outliers that bias the fit, or rows that the law cannot fit; try --robust"
     )
 
 
 def _coefficient_rows(fit: RigFit) -> list[tuple[Parameter, Any, Any]]:
-    """Each coefficient with its value and standard error."""
+    """Return each coefficient with its value and standard error."""
     return [(p, fit.parameters[p.name], fit.parameters_std[p.name]) for p in fit.chosen]
 
 

@@ -1,4 +1,4 @@
-"""The car that an option names: a file, or one that comes with the package, at a chosen fidelity."""
+"""The car that an option names: a file, or a car that comes with the package, at a chosen fidelity."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from jaxveh._core.errors import check_one_of
 from jaxveh.vehicles import kit
 
 AS_PRINTED = "passenger_car_as_printed"
-"""A single track alone: it is there to reproduce a paper."""
+"""A car that exists only as a single track, to reproduce a paper."""
 
 BUILT_IN = {**kit.CARS, AS_PRINTED: vehicles.passenger_car_as_printed}
-"""What makes each car that comes with the package: its numbers, or the vehicle itself."""
+"""The cars that come with the package, by name: functions that make a car's numbers, or the vehicle itself."""
 
 
 def vehicle_of(name: str, fidelity: str = "single-track") -> vehicles.AbstractVehicle:
-    """The car of a name or a file as the vehicle of a fidelity.
+    """Return the car of a name or a file as a vehicle of the given fidelity.
 
-    Raises `InputError` for names that are not there, and where the car's numbers do not reach for the fidelity.
+    Raises `InputError` for an unknown name, and if the car lacks numbers that the fidelity needs.
     """
     check_one_of("--fidelity", fidelity, kit.FIDELITIES)
     if name in kit.CARS:
@@ -34,5 +34,5 @@ def vehicle_of(name: str, fidelity: str = "single-track") -> vehicles.AbstractVe
 
 
 def first_line(of: Any) -> str:
-    """What something is in a line: that of its docstring."""
+    """Return the first paragraph of an object's docstring as one line."""
     return " ".join((inspect.getdoc(of) or "").partition("\n\n")[0].split()).replace("`", "")

@@ -1,5 +1,5 @@
-"""Diagnoses: whether a log is fit to estimate from, what a recording can tell about parameters at all, whether an estimate is as
-good as it says, and the numbers that standards take from a drive."""
+"""Diagnostics: the quality of a log, the observability of parameters from a recording, the consistency of an estimate with its
+standard deviations, and the numbers that standards take from a drive."""
 
 from jaxveh.diagnostics import drive_channels, kit
 from jaxveh.diagnostics.braking_test import BrakingTest, braking_test

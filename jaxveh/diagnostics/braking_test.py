@@ -11,20 +11,20 @@ from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.drive_channels import channel, check_gaps, crossing, has, seconds
 
 PRESSED = 0.01
-"""Share of the greatest brake torque from which on the brake is pressed; without that channel, share of the initial speed
-that is lost by then."""
+"""Share of the largest brake torque above which the brake counts as pressed; without that channel, share of the initial speed
+that is lost when it counts as pressed."""
 
 BETWEEN = (0.8, 0.1)
 """Shares of the initial speed between which the deceleration counts as fully developed (UN R13-H, annex 3, 1.1.3)."""
 
 
 class BrakingTest(NamedTuple):
-    """The numbers of a braking test; those of slower speeds are NaN where the car does not become that slow.
+    """The numbers of a braking test; those at lower speeds are NaN if the car does not become that slow.
 
-    `begins`: when the brake is pressed (s). `speed`: there (m/s). `mean_deceleration` (m/s^2): the mean fully developed
-    deceleration (v_b^2 - v_e^2) / (2 (s_e - s_b)) of UN R13-H, with `v_b`, `v_e` 0.8 and 0.1 of the initial speed. `distance`
-    (m): from the beginning to a tenth of the initial speed. `peak_deceleration` (m/s^2). `most_slip`: the greatest size of
-    any wheel's slip ratio while braking (-; NaN where the recording has none).
+    `begins`: the time when the brake is pressed (s). `speed`: at that time (m/s). `mean_deceleration` (m/s^2): the mean fully
+    developed deceleration (v_b^2 - v_e^2) / (2 (s_e - s_b)) of UN R13-H, with `v_b`, `v_e` 0.8 and 0.1 of the initial speed.
+    `distance` (m): from the beginning to a tenth of the initial speed. `peak_deceleration` (m/s^2). `most_slip`: the largest
+    absolute slip ratio of any wheel while braking (-; NaN if the recording has none).
     """
 
     begins: float
@@ -36,12 +36,12 @@ class BrakingTest(NamedTuple):
 
 
 def braking_test(recording: Recording) -> BrakingTest:
-    """The numbers of a drive that brakes once.
+    """Return the numbers of a drive with one braking.
 
-    The way is the integral of `v_x`. Slip ratios count while the car is faster than a tenth of its initial speed.
+    The distance is the integral of `v_x`. Slip ratios count while the car is faster than a tenth of its initial speed.
 
-    **Raises** `InputError` where `v_x` is missing, the car does not brake, or a channel has a gap of more than `LONGEST_GAP`
-    (0.5 s) where the brake is pressed or while the car brakes.
+    **Raises** `InputError` if `v_x` is missing, the car does not brake, or a channel has a gap of more than `LONGEST_GAP`
+    (0.5 s) when the brake is pressed or while the car brakes.
     """
     time, v_x = seconds(recording), channel(recording, "v_x")
     begins = _begins(recording, time, v_x)

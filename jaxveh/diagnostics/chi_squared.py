@@ -1,4 +1,4 @@
-"""The chi-squared distribution on the host, in float64 whatever JAX's precision is."""
+"""The chi-squared distribution, computed on the host in float64 whatever JAX's precision is."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ TINY = 1e-300
 
 
 def chi_squared_tails(value: float, dof: float) -> tuple[float, float]:
-    """P(X <= value) and P(X > value) of a chi-squared number with `dof` > 0 degrees of freedom, each to about 1e-12 of itself
-    (1e-10 for 1e5 degrees of freedom).
+    """Return P(X <= value) and P(X > value) of a chi-squared variable with `dof` > 0 degrees of freedom.
 
-    The regularised incomplete gamma functions by series below the mean, and by continued fraction above it (M. Abramowitz &
-    I. Stegun 1964, 6.5.29 and 6.5.31), so that neither tail is a difference.
+    The relative accuracy of both is about 1e-12 (1e-10 for 1e5 degrees of freedom).
+
+    The regularised incomplete gamma functions are computed by a series below the mean, and by a continued fraction above it
+    (M. Abramowitz & I. Stegun 1964, 6.5.29 and 6.5.31), so that neither tail is a difference.
     """
     check_positive("degrees of freedom", dof)
     a, x = 0.5 * dof, 0.5 * value
@@ -62,13 +63,13 @@ def _fraction(a: float, x: float) -> float:
 
 @functools.lru_cache(maxsize=1024)
 def chi_squared_quantile(share: float, dof: float) -> float:
-    """The value that a chi-squared number with `dof` degrees of freedom stays below with probability `share`, by bisection.
+    """Return the quantile `share` of a chi-squared variable with `dof` degrees of freedom, by bisection.
 
     **Raises** `InputError` unless 0 < share < 1 and dof > 0.
     """
     check("share", share, lambda p: (p > 0) & (p < 1), "above 0 and below 1")
     check_positive("degrees of freedom", dof)
-    # The smaller tail is the one that keeps its digits.
+    # The smaller tail is used because it keeps its digits.
     below = share <= 0.5
     beyond = lambda x: chi_squared_tails(x, dof)[0] > share if below else chi_squared_tails(x, dof)[1] < 1 - share
     low, high = 0.0, float(dof)
@@ -83,12 +84,12 @@ def chi_squared_quantile(share: float, dof: float) -> float:
 
 
 def chi_squared_band(dof: float, confidence: float = 0.95) -> tuple[float, float]:
-    """What a chi-squared number with `dof` degrees of freedom stays between with probability `confidence`, equal tails."""
+    """Return the interval with equal tails that has probability `confidence` for `dof` degrees of freedom."""
     check("confidence", confidence, lambda p: (p > 0) & (p < 1), "above 0 and below 1")
     tail = 0.5 * (1 - confidence)
     return chi_squared_quantile(tail, dof), chi_squared_quantile(1 - tail, dof)
 
 
 def two_sided(value: float, dof: float) -> float:
-    """The probability of a chi-squared number at least as far out as `value`, on either side: twice the smaller tail."""
+    """Return the two-sided p-value of a chi-squared variable: twice the smaller tail at `value`."""
     return min(1.0, 2 * min(chi_squared_tails(value, dof)))

@@ -1,4 +1,4 @@
-"""Whether a filter's errors are as large as it says: normalised errors squared, and their chi-squared bands."""
+"""Consistency of a filter's errors with its covariance: normalised errors squared, and their chi-squared bands."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from jaxveh.diagnostics.chi_squared import chi_squared_band, two_sided
 from jaxveh.diagnostics.innovations import by_runs_and_rows, checked_skip
 
 FEW_RUNS = 10
-"""Below so many runs their scatter says too little."""
+"""Least number of runs for which the scatter between runs is used."""
 
 
 class Consistency(NamedTuple):
     """Squared normalised errors over their degrees of freedom: 1 is expected everywhere.
 
-    `mean`: over all rows and runs, and `low`, `high` what it lies between with probability `confidence` if the filter is
-    consistent; `p_value`: of a mean at least as far out, on either side; `degrees_of_freedom` of the mean's law.
-    `by_row` (T,): means over runs, with bands `row_low`, `row_high` (T,), all NaN in rows without any.
+    `mean`: over all rows and runs; `low`, `high`: its band, which contains it with probability `confidence` if the filter is
+    consistent; `p_value`: the two-sided probability of such a mean; `degrees_of_freedom`: of the mean's distribution.
+    `by_row` (T,): means over runs, with bands `row_low`, `row_high` (T,), all NaN in rows without errors.
     """
 
     mean: float
@@ -39,43 +39,44 @@ class Consistency(NamedTuple):
 
     @property
     def share_inside(self) -> float:
-        """The share of rows inside their own bands: about `confidence` is expected."""
+        """The share of rows inside their own bands; the expected share is about `confidence`."""
         rows = np.isfinite(self.by_row)
         inside = (self.by_row >= self.row_low) & (self.by_row <= self.row_high)
         return float(np.mean(inside[rows]))
 
     @property
     def verdict(self) -> str:
-        """`consistent`, `too confident` (errors larger than the filter says) or `too cautious` (smaller)."""
+        """`consistent`, `too confident` (errors larger than the covariance implies) or `too cautious` (smaller)."""
         return "consistent" if self.consistent else "too confident" if not self.mean <= self.high else "too cautious"
 
 
 def nis(estimate: Any, confidence: float = 0.95, skip: int = 0) -> Consistency:
-    """Normalised innovations squared: chi-squared, and independent from row to row, if filter and model are right.
+    """Return the normalised innovations squared: chi-squared, and independent between rows, if filter and model are right.
 
-    **Arguments**: `estimate`: whatever has a Gaussian filter's `info` with (T,) leaves, or (R, T) for independent runs: an
-    `Estimate`, or runs of `filters.monte_carlo`. Each row has as many degrees of freedom as channels present. `skip`: rows left
+    **Arguments**: `estimate`: any object with a Gaussian filter's `info` with (T,) leaves, or (R, T) for independent runs: an
+    `Estimate`, or runs of `filters.monte_carlo`. Each row has as many degrees of freedom as measured channels. `skip`: rows left
     out at the start.
 
-    Too large a mean: noises are larger than the model says, or its dynamics are wrong; too small: the filter could be sharper
-    (Y. Bar-Shalom, X. Li & T. Kirubarajan 2001, sec. 5.4.2: with R runs, and with one, as time average).
+    If the mean is too large, the noises are larger than in the model, or its dynamics are wrong; if it is too small, the filter's
+    covariance is too large (Y. Bar-Shalom, X. Li & T. Kirubarajan 2001, sec. 5.4.2, for R runs, and for one run as time average).
 
-    **Raises** `InputError` for particle filters, which have no NIS (`nis_by_channel` has), or where nothing was measured.
+    **Raises** `InputError` for particle filters, which have no NIS (use `nis_by_channel`), or if there is no measurement.
     """
     values = by_runs_and_rows(estimate.info.nis, skip)
     counts = np.sum([np.isfinite(by_runs_and_rows(v, skip)) for v in estimate.info.innovation], axis=0)
     if counts.any() and not np.isfinite(values[counts > 0]).any():
-        raise InputError("nis: this filter reports none (particle filters do not); take nis_by_channel.")
+        raise InputError("nis: this filter has none (particle filters do not); use nis_by_channel.")
     return _independent_rows("nis", values, counts, confidence)
 
 
 def nis_by_channel(estimate: Any, confidence: float = 0.95, skip: int = 0) -> dict[str, Consistency]:
-    """`nis` of each measured channel by itself, which says which sensor's noise is wrong; a mapping by channel.
+    """Return the `nis` of each measured channel alone, which shows the sensor whose noise is wrong; a mapping by channel.
 
-    Each innovation over its predicted spread, squared. For particle filters innovations are not Gaussian where the model is not
-    linear, and the bands are approximate.
+    It is the square of each innovation over its predicted standard deviation. The innovations of particle filters are not
+    Gaussian for a nonlinear model, and the bands are then approximate.
 
-    **Raises** `InputError` where a filter's predicted spread is not finite (noise without a covariance) or nothing was measured.
+    **Raises** `InputError` if a predicted standard deviation is not finite (noise without a covariance), or there is no
+    measurement.
     """
     found = {}
     for name, innovation in estimate.info.innovation._asdict().items():
@@ -87,7 +88,7 @@ def nis_by_channel(estimate: Any, confidence: float = 0.95, skip: int = 0) -> di
             continue
         if not np.isfinite(scaled[here]).all():
             raise InputError(
-                f"nis_by_channel: the predicted spread of {name} is not finite: its noise has no covariance."
+                f"nis_by_channel: the predicted standard deviation of {name} is not finite: its noise has no covariance."
             )
         found[name] = _independent_rows(f"nis of {name}", scaled**2, here.astype(int), confidence)
     if not found:
@@ -96,16 +97,16 @@ def nis_by_channel(estimate: Any, confidence: float = 0.95, skip: int = 0) -> di
 
 
 def nees(error: Any, covariance: Any, confidence: float = 0.95, skip: int = 0) -> Consistency:
-    """Normalised estimation errors squared, `e^T P^-1 e` against the truth: chi-squared with n degrees of freedom.
+    """Return the normalised estimation errors squared, `e^T P^-1 e` against the truth: chi-squared with n degrees of freedom.
 
     **Arguments**: `error` (R, T, n), truth less estimate of R independent runs, `covariance` (R, T, n, n) in the same order (see
     `filters.monte_carlo`). `skip`: rows left out at the start.
 
     A row's mean over R runs has R n degrees of freedom (Bar-Shalom, Li & Kirubarajan 2001, sec. 5.4.2). Rows of one run are
-    **not** independent: from 10 runs on, the mean over all rows has the effective degrees of freedom that the scatter between
-    runs tells (F. Satterthwaite 1946: 2 mean^2 / variance, of each run's mean), never fewer than a row's; with fewer runs it
-    has a row's, a wider band than need be. Beliefs that are no Gaussians, and particle filters whose covariance rests on a few
-    particles, are better judged by `filters.simulation_based_calibration`.
+    **not** independent: with at least 10 runs, the mean over all rows has effective degrees of freedom from the scatter between
+    runs (F. Satterthwaite 1946: 2 mean^2 / variance, of each run's mean), never fewer than a row has; with fewer runs it
+    has those of a row, and its band is wider than necessary. For beliefs that are not Gaussian, and particle filters whose
+    covariance depends on a few particles, use `filters.simulation_based_calibration`.
 
     **Raises** `InputError` for shapes that do not agree, or a covariance that is not positive definite.
     """
@@ -118,7 +119,7 @@ def nees(error: Any, covariance: Any, confidence: float = 0.95, skip: int = 0) -
     error, covariance = error[:, checked_skip(skip, error.shape[1]) :], covariance[:, skip:]
     if not (np.isfinite(error).all() and np.isfinite(covariance).all()):
         raise InputError("nees: an error or a covariance is not finite.")
-    # Scaled to unit diagonal first: states have units of their own.
+    # Scaled to unit diagonal first, because states have different units.
     std = np.sqrt(np.maximum(np.einsum("...ii->...i", covariance), 0))
     if not (std > 0).all():
         raise InputError("nees: a variance is not positive; leave out states that are known exactly.")
@@ -133,7 +134,7 @@ def nees(error: Any, covariance: Any, confidence: float = 0.95, skip: int = 0) -
 
 
 def _dependent_rows(values: np.ndarray, n: int, confidence: float) -> Consistency:
-    """The consistency of values (R, T) over their n degrees of freedom, independent between runs but not between rows."""
+    """Return the consistency of values (R, T) over their n degrees of freedom, independent between runs but not between rows."""
     runs, rows = values.shape
     by_row, row_dof = values.mean(axis=0), runs * n
     row_low, row_high = (edge / row_dof * np.ones(rows) for edge in chi_squared_band(row_dof, confidence))
@@ -145,7 +146,7 @@ def _dependent_rows(values: np.ndarray, n: int, confidence: float) -> Consistenc
 
 
 def _independent_rows(what: str, values: np.ndarray, counts: np.ndarray, confidence: float) -> Consistency:
-    """The consistency of values (R, T) that are independent, each with `counts` (R, T) degrees of freedom."""
+    """Return the consistency of independent values (R, T), each with `counts` (R, T) degrees of freedom."""
     total = int(counts.sum())
     if total == 0:
         raise InputError(f"{what}: no row has a measurement.")

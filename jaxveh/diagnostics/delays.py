@@ -1,4 +1,4 @@
-"""By how much an estimate comes late."""
+"""The delay of an estimate."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import jax.numpy as jnp
 import numpy as np
 
 LONGEST = 2.0
-"""s: what follows later than that is not followed."""
+"""Largest delay that is searched for, s."""
 
 LIVELY = 1e-9
-"""A truth whose spread is less than this share of its size does not move, so that nothing can be late."""
+"""A truth whose standard deviation is less than this share of its size is constant, so that a delay has no meaning."""
 
 FEWEST = 10
-"""Rows without which there is nothing to compare."""
+"""Least number of rows for a comparison."""
 
 
 def delay(time: np.ndarray, mean: np.ndarray, truth: np.ndarray, *, longest: float = LONGEST) -> float:
-    """The delay of `mean` behind `truth` (T,) along `time` (s): by which the truth must be shifted to be nearest to the estimate
-    in the mean square, less the constant error; s, negative where the estimate is early.
+    """Return the delay of `mean` behind `truth` (T,) along `time` (s), in s; it is negative if the estimate is early.
 
-    Both are read at even steps. NaN where fewer than ten rows are finite, the truth does not move, or no shift of up to `longest`
-    (s) is nearest.
+    It is the shift of the truth that minimises the mean square difference from the estimate, without the constant error. Both
+    are interpolated at even steps. The result is NaN if fewer than ten rows are finite, the truth is constant, or there is no
+    minimum within shifts of up to `longest` (s).
     """
     time, mean, truth = (np.asarray(one, float) for one in (time, mean, truth))
     there = np.isfinite(mean) & np.isfinite(truth)
@@ -38,9 +38,10 @@ def delay(time: np.ndarray, mean: np.ndarray, truth: np.ndarray, *, longest: flo
 
 
 def delay_of_rows(mean, truth, there, most: int):
-    """The same in rows of even steps, traced: of the rows that are `there` (T,), shifts of up to `most` rows either way.
+    """Return the delay in rows of even steps, traced.
 
-    Between rows by a parabola through the three nearest shifts.
+    It uses the rows in `there` (T,), and shifts of up to `most` rows either way. A parabola through the three nearest shifts
+    interpolates between rows.
     """
     rows = jnp.arange(truth.shape[0])
     there = there & (rows >= most) & (rows < truth.shape[0] - most)

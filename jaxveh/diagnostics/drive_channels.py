@@ -1,4 +1,4 @@
-"""A drive's channels as plain arrays without gaps, for the numbers of standards."""
+"""The channels of a drive as plain arrays without gaps, for the numbers of standards."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from jaxveh._core.errors import InputError, did_you_mean
 from jaxveh._core.recording import TRUTH, Recording
 
 LONGEST_GAP = 0.5
-"""s: gaps that are bridged where a standard's number is taken; ours. Satellite navigation of 5 Hz passes, an outage does not."""
+"""Longest gap that is bridged for a number of a standard, s; our choice. Satellite navigation at 5 Hz has no longer gaps."""
 
 
 def has(recording: Recording, *names: str) -> bool:
-    """Whether the recording has all of these channels, as truth or as measured."""
+    """Whether the recording has all of these channels, as truth or measured."""
     return all(TRUTH + name in recording or name in recording for name in names)
 
 
 def channel(recording: Recording, name: str) -> np.ndarray:
-    """A channel (T,) in SI units: a simulation's truth where there is one, else what was measured.
+    """Return a channel (T,) in SI units: a simulation's truth if there is one, otherwise the measurements.
 
-    Rows without a sample are filled along lines between their neighbours (devices of several rates leave such gaps), however
-    long the gap is, and rows before the first and after the last sample with that: so figures show them. Numbers are not
-    taken from long gaps: `check_gaps`, `within_gaps`.
+    Rows without a sample are interpolated linearly (devices of different rates leave such gaps), however long the gap is, and
+    rows before the first and after the last sample have the value of that sample, as figures show them. Numbers are not
+    taken from long gaps: see `check_gaps`, `within_gaps`.
 
-    **Raises** `InputError` for a channel that is not there, or that has no finite sample.
+    **Raises** `InputError` for a missing channel, or a channel without finite samples.
     """
     if not has(recording, name):
         names = list(dict.fromkeys(one.removeprefix(TRUTH) for one in recording.names))
         guess = did_you_mean([name], names)
-        raise InputError(f"recording: no channel {name!r} to look at; there are: {', '.join(names)}.{guess}")
+        raise InputError(f"recording: no channel {name!r}; there are: {', '.join(names)}.{guess}")
     values = _samples(recording, name)
     known = np.isfinite(values)
     if not known.any():
@@ -40,19 +40,19 @@ def channel(recording: Recording, name: str) -> np.ndarray:
 
 
 def check_gaps(recording: Recording, name: str, start: float, end: float, asked_by: str) -> None:
-    """Raise `InputError` where a channel has no sample for longer than `LONGEST_GAP` between `start` and `end` (s, own time)."""
+    """Raise `InputError` if a channel has no sample for longer than `LONGEST_GAP` between `start` and `end` (s, own time)."""
     for before, after in _gaps(recording, name):
         if before < end and after > start:
             ended = "from the beginning" if np.isneginf(before) else f"after {before:.3f} s"
             begins = "until the end" if np.isposinf(after) else f"until {after:.3f} s"
             raise InputError(
-                f"{asked_by}: {name} has no sample {ended} {begins}; where a number is taken from, here between {start:.3f} and "
-                f"{end:.3f} s, a gap must be at most {LONGEST_GAP:g} s. Cut the recording beside it (`recording.between`)."
+                f"{asked_by}: {name} has no sample {ended} {begins}; between {start:.3f} and {end:.3f} s, which the numbers "
+                f"need, a gap must be at most {LONGEST_GAP:g} s. Cut the gap off the recording (`recording.between`)."
             )
 
 
 def within_gaps(recording: Recording, name: str) -> np.ndarray:
-    """Whether each row (T,) lies in a gap of a channel that is longer than `LONGEST_GAP`."""
+    """Whether each row (T,) is in a gap of a channel that is longer than `LONGEST_GAP`."""
     time = seconds(recording)
     rows = np.zeros(time.size, bool)
     for before, after in _gaps(recording, name):
@@ -61,10 +61,10 @@ def within_gaps(recording: Recording, name: str) -> np.ndarray:
 
 
 def _gaps(recording: Recording, name: str) -> list[tuple[float, float]]:
-    """The last sample before and the first after each gap that is too long (s); infinite where there is none."""
+    """Return the times of the last sample before and the first after each gap that is too long (s); infinite if there is none."""
     time = seconds(recording)
     known = time[np.isfinite(_samples(recording, name))]
-    too_long = LONGEST_GAP + 1e-6  # Rows half a second apart are within it, whatever their rounding.
+    too_long = LONGEST_GAP + 1e-6  # Rows half a second apart are within it despite rounding.
     inner = np.flatnonzero(np.diff(known) > too_long)
     gaps = [(float(known[k]), float(known[k + 1])) for k in inner]
     if known.size == 0 or known[0] - time[0] > too_long:
@@ -79,24 +79,24 @@ def _samples(recording: Recording, name: str) -> np.ndarray:
 
 
 def seconds(recording: Recording) -> np.ndarray:
-    """The recording's own time, s."""
+    """Return the recording's own time, s."""
     return np.asarray(recording.time, np.float64)
 
 
 def sideslip_channels(recording: Recording) -> tuple[str, ...]:
-    """What the sideslip is taken from: the channel, else `v_x` and `v_y`."""
+    """Return the channels from which the sideslip is taken: the channel itself, otherwise `v_x` and `v_y`."""
     return ("sideslip",) if has(recording, "sideslip") else ("v_x", "v_y")
 
 
 def sideslip(recording: Recording) -> np.ndarray:
-    """Sideslip at the centre of gravity (T,), rad: the channel, else from `v_x` and `v_y`."""
+    """Return the sideslip at the centre of gravity (T,), rad: the channel, otherwise from `v_x` and `v_y`."""
     if has(recording, "sideslip"):
         return channel(recording, "sideslip")
     return np.arctan2(channel(recording, "v_y"), channel(recording, "v_x"))
 
 
 def crossing(time: np.ndarray, values: np.ndarray, level: float, after: float = -np.inf) -> float:
-    """The first instant (s) at or after `after` at which `values` reach the `level` from below, along lines; NaN if never."""
+    """Return the first instant (s) at or after `after` at which `values` rise to the `level`, interpolated; NaN if never."""
     above = np.flatnonzero((values >= level) & (time >= after))
     if above.size == 0:
         return float("nan")
@@ -108,9 +108,9 @@ def crossing(time: np.ndarray, values: np.ndarray, level: float, after: float = 
 
 
 def peak(time: np.ndarray, values: np.ndarray) -> tuple[float, float]:
-    """Instant (s) and height of the greatest value: the top of the parabola through it and its neighbours.
+    """Return instant (s) and height of the largest value: the top of the parabola through it and its neighbours.
 
-    The row itself where it has no finite neighbour on one side: values that do not count are minus infinity.
+    It is the row itself if a neighbour is missing or not finite: values that do not count are minus infinity.
     """
     k = int(np.argmax(values))
     if k in (0, values.size - 1) or not np.isfinite(values[k - 1 : k + 2]).all():

@@ -1,4 +1,4 @@
-"""The numbers that a test engineer takes from a drive, by the manoeuvre's name."""
+"""The numbers of standard tests for a drive, by the manoeuvre's name."""
 
 from __future__ import annotations
 
@@ -19,8 +19,10 @@ OUTPUTS = ("yaw_rate", "a_y")
 
 
 class Peaks(NamedTuple):
-    """Greatest sizes in a drive: `a_y` (m/s^2), `yaw_rate` (rad/s), `sideslip` (rad), and the least `load` of a wheel (N; NaN
-    where the recording has none)."""
+    """Largest absolute values in a drive: `a_y` (m/s^2), `yaw_rate` (rad/s) and `sideslip` (rad).
+
+    `least_load`: N, the smallest load of a wheel, NaN if the recording has no loads.
+    """
 
     a_y: float
     yaw_rate: float
@@ -29,8 +31,10 @@ class Peaks(NamedTuple):
 
 
 class LowestFrequency(NamedTuple):
-    """The `gain` (SI) of a frequency response at its lowest `frequency` (Hz), near the steady one, and the frequency
-    `at_45_deg` (Hz) from which on the answer lags by more than 45 degrees (NaN: nowhere)."""
+    """The `gain` (SI) of a frequency response at its lowest `frequency` (Hz), which is close to the steady-state gain.
+
+    `at_45_deg` (Hz): the frequency above which the response lags by more than 45 degrees (NaN: nowhere).
+    """
 
     frequency: float
     gain: float
@@ -38,7 +42,7 @@ class LowestFrequency(NamedTuple):
 
 
 def peaks(recording: Recording) -> Peaks:
-    """The greatest sizes in a drive, of the samples that there are; NaN for what the recording does not have."""
+    """Return the largest absolute values in a drive, over all samples; NaN for channels missing from the recording."""
     loads = [f"load_{wheel}" for wheel in ("fl", "fr", "rl", "rr") if has(recording, f"load_{wheel}")]
     size = lambda values: float(np.max(np.abs(values)))
     of = lambda name: size(channel(recording, name)) if has(recording, name) else float("nan")
@@ -52,7 +56,7 @@ def peaks(recording: Recording) -> Peaks:
 
 
 class _Car(NamedTuple):
-    """What the numbers need to know of the car: `wheelbase` (m) and `steer_at_03g` (rad); None where nobody knows."""
+    """The numbers of the car that are needed: `wheelbase` (m) and `steer_at_03g` (rad); None if unknown."""
 
     wheelbase: float | None = None
     steer_at_03g: float | None = None
@@ -65,12 +69,12 @@ def drive_numbers(
     *,
     steer_at_03g: float | None = None,
 ) -> dict[str, Any]:
-    """Named tuples of numbers by title: what a drive of a `manoeuvre` (its name in `jaxveh.manoeuvres.MANOEUVRES`) is made for.
+    """Return the numbers that a `manoeuvre` (its name in `jaxveh.manoeuvres.MANOEUVRES`) is made for, as named tuples by title.
 
-    `wheelbase` (m) serves the understeer gradient, `steer_at_03g` (rad at the road wheels) the `sine_with_dwell`. Other
-    manoeuvres, and those without a name, have their peaks alone.
+    `wheelbase` (m) is used for the understeer gradient, `steer_at_03g` (rad at the road wheels) for the `sine_with_dwell`. For
+    other manoeuvres, and without a name, there are only the peaks.
 
-    **Raises** `InputError` where the drive does not carry the numbers: too short, or a channel is missing.
+    **Raises** `InputError` if the drive does not allow the numbers: it is too short, or a channel is missing.
     """
     return {"peaks": peaks(recording), **_NUMBERS.get(manoeuvre or "", _none)(recording, _Car(wheelbase, steer_at_03g))}
 

@@ -11,20 +11,23 @@ from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.drive_channels import channel, check_gaps, seconds
 
 LONGEST = 20.0
-"""Seconds of a segment at most unless told: a resolution of 0.05 Hz."""
+"""Longest default segment, s: a resolution of 0.05 Hz."""
 
 EXCITED = 0.01
-"""Share of the input's greatest spectral density below which a frequency does not count as excited."""
+"""Share of the input's largest spectral density below which a frequency does not count as excited."""
 
 
 END_ROWS, STILL = 2, 0.05
-"""How many rows at either end, and within what share of the range, make a drive that starts and ends straight."""
+"""A drive starts and ends straight if this many rows at either end lie within this share of the range."""
 
 
 class FrequencyResponse(NamedTuple):
-    """`frequency` (n,) in Hz, where the input has power; `response` (n,) complex, output over input in SI units;
-    `coherence` (n,) from 0 to 1: the share of the output that the input explains linearly; `segments`: how many were
-    averaged (with one, the coherence says nothing)."""
+    """A frequency response.
+
+    `frequency` (n,) in Hz, where the input has power; `response` (n,) complex, output over input in SI units;
+    `coherence` (n,) from 0 to 1: the share of the output that the input explains linearly; `segments`: the number of averaged
+    segments (with one, the coherence has no meaning).
+    """
 
     frequency: np.ndarray
     response: np.ndarray
@@ -35,15 +38,15 @@ class FrequencyResponse(NamedTuple):
 def frequency_response(
     recording: Recording, output: str = "yaw_rate", input: str = "steer", *, segment: float | None = None
 ) -> FrequencyResponse:
-    """`output` over `input` by Welch's method: the mean cross spectrum over the mean spectrum of the input (H1 estimate).
+    """Return the response of `output` to `input` by Welch's method: mean cross spectrum over mean input spectrum (H1 estimate).
 
-    Segments of `segment` seconds (default: a quarter of the drive, at most `LONGEST`) under Hann windows, each three quarters
-    over the next (P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967); J. S. Bendat and A. G. Piersol, Random Data, ch. 11).
-    A drive that starts and ends straight goes on so before and after, which brings a sweep's ends into full windows; from the
-    segments of any other the mean is taken. An uneven time base is made even along lines. The response is biased where it bends
-    within `1 / segment` Hz.
+    Segments of `segment` seconds (default: a quarter of the drive, at most `LONGEST`) have Hann windows and overlap by three
+    quarters (P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967); J. S. Bendat and A. G. Piersol, Random Data, ch. 11).
+    A drive that starts and ends straight is extended by its end values, so that full windows cover the ends of a sweep; in any
+    other drive the mean of each segment is subtracted. An uneven time base is made even by linear interpolation. The response is
+    biased where it changes within `1 / segment` Hz.
 
-    **Raises** `InputError` for missing channels or gaps in them of more than `LONGEST_GAP` (0.5 s), an input that does not move,
+    **Raises** `InputError` for missing channels or gaps in them of more than `LONGEST_GAP` (0.5 s), a constant input,
     or a segment that is out of range.
     """
     time = seconds(recording)
@@ -65,8 +68,8 @@ def frequency_response(
     S_uu, S_yy = np.mean(np.abs(U) ** 2, axis=0), np.mean(np.abs(Y) ** 2, axis=0)
     S_uy = np.mean(np.conj(U) * Y, axis=0)
     if not np.max(S_uu[1:]) > 0:
-        raise InputError(f"frequency_response: {input} does not move; there is nothing to answer.")
-    # The mean is removed, so that zero says nothing.
+        raise InputError(f"frequency_response: {input} is constant; there is no excitation.")
+    # The mean is removed, so that frequency zero has no information.
     keep = S_uu >= EXCITED * np.max(S_uu[1:])
     keep[0] = False
     S_uu, S_yy, S_uy = S_uu[keep], S_yy[keep], S_uy[keep]
@@ -75,13 +78,13 @@ def frequency_response(
 
 
 def _straight_ends(values: np.ndarray) -> bool:
-    """Whether the first two and the last two rows all stand where the first does."""
+    """Whether the first two and the last two rows all have the value of the first."""
     ends = np.concatenate([values[:END_ROWS], values[-END_ROWS:]])
     return bool(np.max(np.abs(ends - values[0])) <= STILL * np.ptp(values))
 
 
 def _spectra(values: np.ndarray, rows: int) -> np.ndarray:
-    """The transforms of the segments, (segments, frequencies)."""
+    """Return the Fourier transforms of the segments, (segments, frequencies)."""
     window = np.hanning(rows + 1)[:-1]
     starts = range(0, values.size - rows + 1, max(rows // 4, 1))
     parts = np.stack([values[start : start + rows] for start in starts])

@@ -10,14 +10,14 @@ from jaxveh._core.errors import InputError
 
 
 def checked_skip(skip: int, rows: int) -> int:
-    """`skip`, or `InputError` unless it leaves at least one of so many rows."""
+    """Return `skip`; raise `InputError` unless it leaves at least one of `rows`."""
     if not 0 <= skip < rows:
         raise InputError(f"skip = {skip}: must be from 0 to {rows - 1}, for {rows} rows.")
     return skip
 
 
 def by_runs_and_rows(values: Any, skip: int = 0) -> np.ndarray:
-    """(T,) or (R, T) values as (R, T - skip), in float64; `InputError` for other shapes."""
+    """Return (T,) or (R, T) values as (R, T - skip), in float64; raise `InputError` for other shapes."""
     values = np.asarray(values, np.float64)
     if values.ndim not in (1, 2):
         raise InputError(f"values of each row have shape {values.shape}: must be (T,), or (R, T) for several runs.")
@@ -26,12 +26,13 @@ def by_runs_and_rows(values: Any, skip: int = 0) -> np.ndarray:
 
 
 def whitened_innovations(info: Any, skip: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Innovations over their predicted spread (R, T, m), zero where missing, and which are present (R, T, m).
+    """Return innovations over their predicted standard deviations (R, T, m), zero where missing, and which are present (R, T, m).
 
-    Decorrelated within a row where the filter does so (`info.whitened`); else each channel by itself, which leaves rows
-    uncorrelated just as well.
+    They are decorrelated within a row if the filter does so (`info.whitened`); otherwise each channel is scaled alone, which
+    leaves rows equally uncorrelated.
 
-    **Raises** `InputError` where a predicted spread is not finite (the noise has no covariance), or where nothing was measured.
+    **Raises** `InputError` if a predicted standard deviation is not finite (the noise has no covariance), or there is no
+    measurement.
     """
     here = np.stack([np.isfinite(by_runs_and_rows(values, skip)) for values in info.innovation], axis=-1)
     if not here.any():
@@ -45,6 +46,7 @@ def whitened_innovations(info: Any, skip: int = 0) -> tuple[np.ndarray, np.ndarr
     if lost.any():
         name = info.innovation._fields[int(np.argmax(lost.any(axis=(0, 1))))]
         raise InputError(
-            f"innovations: {name} over its predicted spread is not finite: the filter failed, or the noise has no covariance."
+            f"innovations: {name} over its predicted standard deviation is not finite: the filter failed, or the noise has no "
+            "covariance."
         )
     return np.where(here, white, 0), here

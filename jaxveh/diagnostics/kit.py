@@ -1,4 +1,4 @@
-"""Numbers that figures share with what they show, and what estimators of real logs build with."""
+"""Numbers that figures share with the diagnostics that they show, and tools for estimators of real logs."""
 
 from jaxveh.diagnostics.log_delays import a_y_delay
 from jaxveh.diagnostics.observability import UNOBSERVABLE

@@ -1,4 +1,4 @@
-"""Is this log fit to estimate from? All checks in one call."""
+"""All checks of a log in one call."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ CHECKS = (
 
 
 def check_log(recording: Recording, *, car: CarSpecification | None = None) -> list[LogFinding]:
-    """Look at a log before trusting it: every check's findings, good and bad, in the order of `CHECKS`.
+    """Check a log before its data are used; return the findings of every check, good and bad, in the order of `CHECKS`.
 
-    **Arguments**: `recording` with channels of the usual names (`v_x`, `v_y`, `yaw_rate`, `a_x`, `a_y`, `steer`) in SI; what
-    is missing is not checked. `car`: as `io.read_car` gives it; with it, scale and offset of the steering, delays
-    and understeer are held against a linear single track, without it against what is usual, and `steer` may be told by
-    `steering_wheel` and the file's ratio.
+    **Arguments**: `recording` with channels of the usual names (`v_x`, `v_y`, `yaw_rate`, `a_x`, `a_y`, `steer`) in SI;
+    missing channels are not checked. `car`: as `io.read_car` reads it; with it, scale and offset of the steering, delays
+    and understeer are compared with a linear single track, without it with usual values, and a missing `steer` is computed
+    from `steering_wheel` and the file's ratio.
 
-    Rates, jitter, gaps and missing samples; repeated, frozen and coarse values and spikes; magnitudes; signs and units
-    by what channels must agree on; delays by cross-correlation; steering scale and offset; grip and the car's own numbers.
-    Host side, in NumPy; nothing is changed. Simulated truth (`true.` channels) is not looked at.
+    The checks are: rates, jitter, gaps and missing samples; repeated, frozen and coarse values and spikes; magnitudes; signs and
+    units, from relations between channels; delays, by cross-correlation; steering scale and offset; grip and the car's numbers.
+    They run on the host in NumPy, and change nothing. Simulated truth (`true.` channels) is not checked.
 
-    **Raises** `InputError` for a car whose rear wheels are steered: nothing here knows their angles.
+    **Raises** `InputError` for a car whose rear wheels are steered, because the checks do not include their angles.
     """
     if car is not None:
         kit.check_front_steered(car, "check_log")

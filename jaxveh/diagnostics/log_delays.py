@@ -12,29 +12,29 @@ from jaxveh.diagnostics.log_single_track import a_y_from_yaw_rate, yaw_rate_from
 from jaxveh.io import CarSpecification
 
 REACH = 0.5
-"""Longest delay that is looked for, in seconds."""
+"""Longest delay that is searched for, s."""
 
 ALIKE = 0.6
-"""Correlation below which two channels are too different to time one by the other."""
+"""Correlation below which two channels are too different for a delay between them."""
 
 AROUND = 0.04
-"""Half the width in seconds of the parabola through the peak."""
+"""Half the width of the parabola through the peak, s."""
 
 ALIKE_ROWS = 0.2
-"""Seconds whose rows count as one independent sample."""
+"""Time whose rows count as one independent sample, s."""
 
 EXACT = 0.02
-"""Seconds of delay that count where physics ties two channels to each other."""
+"""Largest delay without a warning between two channels that are related exactly, s."""
 
 SMOOTH = 0.2
-"""Seconds of the moving average on both channels."""
+"""Length of the moving average of both channels, s."""
 
 MODELLED = 0.06
-"""Seconds of delay that count where a linear model of the car stands between them."""
+"""Largest delay without a warning between two channels that are related by a linear model of the car, s."""
 
 
 class Delay(NamedTuple):
-    """`seconds` by which a signal comes after its reference, the standard `error` of that, the `correlation` there."""
+    """The delay of a signal after its reference in `seconds`, its standard `error`, and the `correlation` at that delay."""
 
     seconds: float
     error: float
@@ -42,12 +42,12 @@ class Delay(NamedTuple):
 
 
 def delay(reference: np.ndarray, signal: np.ndarray, step: float, reach: float = REACH) -> Delay:
-    """By how much `signal` comes after `reference`.
+    """Return the delay of `signal` after `reference`.
 
-    Both (N,) on an even grid of `step` seconds, NaN where missing. The peak of the normalised cross-correlation within
-    +-`reach` is refined by a parabola through its neighbours within `AROUND`; the error follows from its curvature,
-    and from how far away a lag lies that is less likely by exp(-2) at most (two standard deviations), with
-    `ALIKE_ROWS` seconds counting as one sample. NaN where there is no inner peak.
+    Both are (N,) on an even grid of `step` seconds, NaN where missing. The peak of the normalised cross-correlation within
+    +-`reach` is refined by a parabola through its neighbours within `AROUND`. The error is the larger of that from the curvature
+    and that from the farthest lag whose likelihood is lower by a factor of exp(-2) at most (two standard deviations), where
+    `ALIKE_ROWS` seconds count as one sample. The delay is NaN if there is no inner peak.
     """
     most = min(round(reach / step), reference.size // 4)
     found = _correlations(reference, signal, most)
@@ -63,7 +63,7 @@ def delay(reference: np.ndarray, signal: np.ndarray, step: float, reach: float =
         return Delay(np.nan, np.inf, float(found[peak]))
     samples = max(np.isfinite(reference * signal).sum() * step / ALIKE_ROWS, 1.0)
     error = step * np.sqrt(max(1 - top**2, 0.0) / (2 * top * -bend * samples))
-    # The curvature may be that of a bump of noise: other lags that explain the signal nearly as well count too.
+    # The peak may be due to noise: other lags that explain the signal nearly as well count too.
     worse = 0.5 * samples * np.log((1 - found**2 + 1e-12) / (1 - found[peak] ** 2 + 1e-12))
     rivals = np.flatnonzero((worse < 2.0) & (found > 0))
     error = max(error, 0.5 * step * np.abs(rivals - peak).max())
@@ -72,7 +72,7 @@ def delay(reference: np.ndarray, signal: np.ndarray, step: float, reach: float =
 
 
 def check_delays(log: LogView) -> list[LogFinding]:
-    """Delays of a_y and a_x after the speeds and the gyroscope, and of yaw rate after steer."""
+    """Check the delays of a_y and a_x after the speeds and the gyroscope, and of yaw rate after steer."""
     findings = []
     if log.has("v_x", "yaw_rate", "a_y"):
         findings.append(_lateral(log))
@@ -93,13 +93,13 @@ def _lateral(log: LogView) -> LogFinding:
         return _judge(log, "a_y", "v_x yaw_rate + dv_y/dt", reference, "", EXACT)
     if log.car is not None:
         reference = _a_y_expected(log, log.car)
-        return _judge(log, "a_y", "what the car's linear model makes of yaw_rate", reference, "", MODELLED)
-    caveat = " Without v_y or a car, the sideslip's own lag of up to 0.2 s at speed is part of it."
+        return _judge(log, "a_y", "the prediction of the car's linear model from yaw_rate", reference, "", MODELLED)
+    caveat = " Without v_y or a car, this includes the sideslip's own lag of up to 0.2 s at speed."
     return _judge(log, "a_y", "v_x yaw_rate", speed * yaw_rate, caveat, np.inf)
 
 
 def _a_y_expected(log: LogView, car: CarSpecification) -> np.ndarray:
-    """What the car's linear model makes of yaw_rate, on the grid."""
+    """Return the a_y that the car's linear model predicts from yaw_rate, on the grid."""
     speed, yaw_rate = log.even("v_x"), log.even("yaw_rate")
     known = np.isfinite(speed) & np.isfinite(yaw_rate)
     filled = [np.where(known, values, 0.0) for values in (speed, yaw_rate)]
@@ -107,9 +107,9 @@ def _a_y_expected(log: LogView, car: CarSpecification) -> np.ndarray:
 
 
 def a_y_delay(recording: Recording, car: CarSpecification) -> Delay | None:
-    """By how much a_y comes after what a car's linear model makes of yaw_rate; None where one of them, or v_x, is missing.
+    """Return the delay of a_y after the prediction of a car's linear model from yaw_rate; None if a channel is missing.
 
-    A stiffness that is wrong by a factor of two makes it wrong by some 0.05 s, and so do tyres near their limit.
+    A stiffness that is wrong by a factor of two causes an error of some 0.05 s, and so do tyres near their limit.
     """
     log = LogView.of(recording, car)
     if not log.has("v_x", "yaw_rate", "a_y"):
@@ -121,18 +121,18 @@ def a_y_delay(recording: Recording, car: CarSpecification) -> Delay | None:
 def _steering(log: LogView) -> LogFinding:
     steer = log.even("steer")
     if log.car is None:
-        caveat = " Without a car, its own response of some 0.1 s is part of it."
+        caveat = " Without a car, this includes its own response of some 0.1 s."
         return _judge(log, "yaw_rate", "steer", log.while_moving(steer), caveat, np.inf)
     expected = yaw_rate_from_steer(log.car, steer, log.even("v_x"), log.step)
-    return _judge(log, "yaw_rate", "what the car's linear model makes of steer", expected, "", MODELLED)
+    return _judge(log, "yaw_rate", "the prediction of the car's linear model from steer", expected, "", MODELLED)
 
 
 def _judge(log: LogView, name: str, other: str, reference: np.ndarray, caveat: str, tolerance: float) -> LogFinding:
-    # The same symmetric average on both sides takes out noise and delays neither.
+    # The same symmetric average on both sides removes noise and delays neither.
     found = delay(log.smooth(reference, SMOOTH), log.smooth(log.even(name), SMOOTH), log.step)
     values = {name: value for name, value in found._asdict().items() if np.isfinite(value)}
     if not (found.correlation > ALIKE and np.isfinite(found.seconds)):
-        message = f"cannot be timed against {other}: they are too different (correlation {found.correlation:.2f})."
+        message = f"has no clear delay after {other}: they are too different (correlation {found.correlation:.2f})."
         return LogFinding("note", name, message, values)
     size, sure = abs(found.seconds), 2 * found.error
     words = (
@@ -142,11 +142,11 @@ def _judge(log: LogView, name: str, other: str, reference: np.ndarray, caveat: s
         return LogFinding("ok", name, words, values)
     if np.isinf(tolerance):
         return LogFinding("note", name, words, values)
-    return LogFinding("warning", name, f"{words} Shift the channel by as much before estimating.", values)
+    return LogFinding("warning", name, f"{words} Shift the channel by this delay before estimating.", values)
 
 
 def _correlations(reference: np.ndarray, signal: np.ndarray, most: int) -> np.ndarray:
-    """Pearson's correlation (2 most + 1,) of reference[k] with signal[k + lag] over the rows known on both sides."""
+    """Return Pearson's correlation (2 most + 1,) of reference[k] with signal[k + lag] over the rows known on both sides."""
     known = np.isfinite(reference), np.isfinite(signal)
     if min(known[0].sum(), known[1].sum()) < 20:
         return np.full(2 * most + 1, np.nan)
@@ -164,7 +164,7 @@ def _correlations(reference: np.ndarray, signal: np.ndarray, most: int) -> np.nd
     count = np.where(summed(0, 0) > 19.5, summed(0, 0), np.nan)
     shared = summed(1, 1) - summed(1, 0) * summed(0, 1) / count
     spread = summed(2, 0) - summed(1, 0) ** 2 / count, summed(0, 2) - summed(0, 1) ** 2 / count
-    # What is left of a constant after the transforms is rounding.
+    # A constant leaves only rounding errors after the transforms.
     tiny = [1e-12 * abs(terms[2, 0]) for terms in (first, second)]
     moves = (spread[0] > tiny[0]) & (spread[1] > tiny[1])
     return np.where(moves, shared / np.sqrt(np.where(moves, spread[0] * spread[1], 1.0)), np.nan)

@@ -1,4 +1,4 @@
-"""What a check of a log says, and the view of a log that the checks share."""
+"""The findings of the checks of a log, and the view of a log that the checks share."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from jaxveh._core.recording import Recording
 from jaxveh.io import CarSpecification
 
 SEVERITIES = ("ok", "note", "warning", "error")
-"""From nothing to do, over worth knowing, to: estimates will suffer, estimates will be wrong."""
+"""Severities: nothing to do; worth knowing; estimates will be worse; estimates will be wrong."""
 
 GRAVITY = 9.81
-"""m/s^2"""
+"""Gravity, m/s^2."""
 
 
 MOVING, WHEELBASE = 5.0, 2.7
-"""m/s above which directions are compared, of a car of this wheelbase (m); of others by its square root."""
+"""Speed above which directions are compared (m/s), for a car of this wheelbase (m); it scales with the root of the wheelbase."""
 
 
 class LogFinding(NamedTuple):
-    """One finding: `severity` (of `SEVERITIES`), the `channel` it is about, `message` in words, `values` by name."""
+    """One finding: its `severity` (of `SEVERITIES`), the `channel` concerned, a `message` in words, `values` by name."""
 
     severity: str
     channel: str
@@ -33,7 +33,7 @@ class LogFinding(NamedTuple):
 
 @dataclass(frozen=True)
 class LogView:
-    """A recording as NumPy arrays in float64: `time` (T,), `channels` name to (T,), and the car, if it is known."""
+    """A recording as NumPy arrays in float64: `time` (T,), `channels` name to (T,), and the `car`, None if unknown."""
 
     time: np.ndarray
     channels: dict[str, np.ndarray]
@@ -41,18 +41,18 @@ class LogView:
 
     @classmethod
     def of(cls, recording: Recording, car: CarSpecification | None) -> LogView:
-        """The measured channels of a recording; a simulation's truth is no log."""
+        """Make a view of the measured channels of a recording, without a simulation's truth."""
         names = [name for name in recording.names if not name.startswith("true.")]
         channels = {name: np.asarray(recording[name], dtype=np.float64) for name in names}
         return cls(np.asarray(recording.time, dtype=np.float64), channels, car)
 
     def has(self, *names: str) -> bool:
-        """Whether every one of these channels is there with at least ten finite samples."""
+        """Whether all of these channels are present with at least ten finite samples."""
         return all(name in self.channels and np.isfinite(self.channels[name]).sum() >= 10 for name in names)
 
     @cached_property
     def grid(self) -> np.ndarray:
-        """Even stamps (N,) with the fastest channel's usual step, for everything that correlates or differentiates."""
+        """Even time stamps (N,) with the usual step of the fastest channel, for correlations and derivatives."""
         masks = [np.isfinite(values) for values in self.channels.values()]
         steps = [np.median(np.diff(self.time[mask])) for mask in masks if mask.sum() > 1]
         if not steps:
@@ -66,14 +66,14 @@ class LogView:
         return float(self.grid[1] - self.grid[0]) if self.grid.size > 1 else np.nan
 
     def even(self, name: str) -> np.ndarray:
-        """A channel on `grid`, linear between its samples; NaN outside them and in gaps over 0.5 s or 2.5 steps."""
+        """Return a channel on `grid`, linear between its samples; NaN outside them, and in gaps over 0.5 s and 2.5 steps."""
         values = self.channels[name]
         known = np.isfinite(values)
         time = self.time[known]
         on_grid = np.interp(self.grid, time, values[known])
         after = np.clip(np.searchsorted(time, self.grid), 1, time.size - 1)
         longest = max(0.5, 2.5 * float(np.median(np.diff(time))))
-        hair = 1e-6 * self.step  # the grid meets stamps but for rounding
+        hair = 1e-6 * self.step  # the grid meets time stamps up to rounding
         inside_gap = (self.grid > time[after - 1] + hair) & (self.grid < time[after] - hair)
         on_grid[inside_gap & (time[after] - time[after - 1] > longest)] = np.nan
         on_grid[(self.grid < time[0] - hair) | (self.grid > time[-1] + hair)] = np.nan
@@ -81,20 +81,20 @@ class LogView:
 
     @property
     def least_speed(self) -> float:
-        """Speed (m/s) above which directions are compared: `MOVING`, and less for small cars."""
+        """Speed (m/s) above which directions are compared: `MOVING`, but less for small cars."""
         return MOVING * min(1.0, ((self.car.wheelbase if self.car else WHEELBASE) / WHEELBASE) ** 0.5)
 
     def while_moving(self, values: np.ndarray) -> np.ndarray:
-        """Values (N,) on `grid`, NaN where the car is slower than `least_speed` or its speed is not known."""
+        """Return values (N,) on `grid`, NaN where the car is slower than `least_speed` or its speed is unknown."""
         with np.errstate(invalid="ignore"):
             return np.where(self.even("v_x") > self.least_speed, values, np.nan)
 
     def slope(self, values: np.ndarray) -> np.ndarray:
-        """Time derivative (N,) on `grid`."""
+        """Return the time derivative (N,) on `grid`."""
         return np.gradient(values, self.step)
 
     def smooth(self, values: np.ndarray, seconds: float = 0.1) -> np.ndarray:
-        """Moving average (N,) on `grid`, symmetric, so that it delays nothing; the ends and rows beside NaN are NaN."""
+        """Return the symmetric moving average (N,) on `grid`, which adds no delay; the ends and rows beside NaN are NaN."""
         count = 2 * round(seconds / self.step / 2) + 1
         if count >= values.size:
             return np.full_like(values, np.nan)
@@ -111,11 +111,11 @@ _ALIKE = 10
 
 
 def fit(target: np.ndarray, *regressors: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Least squares with an intercept over the finite rows, once more without what is 4 robust deviations off.
+    """Fit by least squares with an intercept over the finite rows, and again without rows 4 robust deviations off.
 
     Returns coefficients (1 + regressors,), the intercept first, their standard errors (ten neighbouring rows count as
-    one, for they are alike), and the correlation of the fit with the target. Fewer than ten rows tell nothing: zeros,
-    infinite errors, no correlation.
+    one, because they are correlated), and the correlation of the fit with the target. With fewer than ten rows the result is
+    zeros, infinite errors and no correlation.
     """
     rows = np.stack([np.ones_like(target), *regressors], axis=1)
     finite = np.isfinite(target) & np.isfinite(rows).all(axis=1)

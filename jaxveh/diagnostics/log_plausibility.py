@@ -1,4 +1,4 @@
-"""What a car can do, and whether its file describes a car."""
+"""Checks of the plausibility of accelerations, and of the numbers in a car file."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from jaxveh.diagnostics.log_findings import GRAVITY, LogFinding, LogView
 from jaxveh.io import CarSpecification
 
 FRICTION = 1.3
-"""Lateral acceleration over gravity that tyres reach without downforce, racing tyres included."""
+"""Largest lateral acceleration over gravity of tyres without downforce, racing tyres included."""
 
 _STIFFNESS = (4.0, 60.0)  # cornering stiffness of an axle over its load, 1/rad
 _INERTIA = (0.4, 2.0)  # yaw inertia over mass a b
 
 
 def check_plausibility(log: LogView) -> list[LogFinding]:
-    """Whether accelerations are within what tyres carry, and stiffnesses and inertia within what cars have."""
+    """Check whether tyres can carry the accelerations, and cars can have the stiffnesses and the inertia."""
     findings = []
     for name in ("a_y", "a_x"):
         if log.has(name):
@@ -24,7 +24,7 @@ def check_plausibility(log: LogView) -> list[LogFinding]:
 
 
 def check_car(car: CarSpecification) -> list[LogFinding]:
-    """Whether stiffnesses over axle loads and the inertia over mass a b are those of a car."""
+    """Check whether stiffnesses over axle loads and the inertia over mass a b are plausible for a car."""
     findings = []
     for axle, stiffness, arm in (
         ("front", float(car.front_cornering_stiffness or 0), car.rear_axle_to_cg),
@@ -33,7 +33,7 @@ def check_car(car: CarSpecification) -> list[LogFinding]:
         load = car.mass * GRAVITY * arm / car.wheelbase
         unit = " N/deg instead of N/rad, or one wheel instead of two?"
         findings.append(
-            _ratio(f"{axle}_cornering_stiffness", stiffness / load, _STIFFNESS, "the axle's load a radian", unit)
+            _ratio(f"{axle}_cornering_stiffness", stiffness / load, _STIFFNESS, "the axle's load per radian", unit)
         )
     inertia = car.yaw_inertia / (car.mass * car.front_axle_to_cg * car.rear_axle_to_cg)
     findings.append(_ratio("yaw_inertia", inertia, _INERTIA, "mass times both axle distances", ""))

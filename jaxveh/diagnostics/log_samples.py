@@ -1,4 +1,4 @@
-"""Samples that are suspicious in themselves: held, frozen, coarse, spikes."""
+"""Checks of the samples of single channels: repeated values, frozen stretches, coarse steps, spikes."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ import numpy as np
 from jaxveh.diagnostics.log_findings import LogFinding, LogView
 
 HELD = 0.1
-"""Share of samples equal to the one before above which a channel is said to repeat."""
+"""Share of samples equal to the previous one above which a channel is reported to repeat."""
 
 FROZEN = 1.0
-"""Seconds without any change, while the channel moves elsewhere, that look like a sensor that stopped."""
+"""Time without any change, in a channel that changes elsewhere, that is reported as a stopped sensor, s."""
 
 NEVER_STILL = ("v_x", "v_y", "a_x", "a_y", "yaw_rate", "roll_rate", "sideslip")
-"""Channels that always change while a car moves. Others (pedals, a steer that is held) may stand still, and nothing is wrong."""
+"""Channels that always change while a car moves. Others (pedals, a held steer) may be constant although nothing is wrong."""
 
 JUMPY = ("throttle", "brake", "wheel_speed", "drive_torque", "gear")
-"""Beginnings of names of channels that may jump, and nothing is wrong."""
+"""Beginnings of the names of channels that may jump although nothing is wrong."""
 
 SPIKE = 8.0
-"""Robust deviations from the running median that make a spike, if also `SPIKE_RANGE` of the channel's range."""
+"""A sample is a spike if it is this many robust deviations, and `SPIKE_RANGE` of the range, off the running median."""
 
 SPIKE_RANGE = 0.1
 _HALF_WINDOW = 3
 
 
 def check_samples(log: LogView) -> list[LogFinding]:
-    """Repeated values (the true update rate), frozen stretches, coarse steps and spikes of every channel."""
+    """Check every channel for repeated values (the true update rate), frozen stretches, coarse steps and spikes."""
     findings = []
     for name, values in log.channels.items():
         present = np.isfinite(values)
@@ -34,7 +34,7 @@ def check_samples(log: LogView) -> list[LogFinding]:
             continue
         time, samples = log.time[present], values[present]
         if np.all(samples == samples[0]):
-            message = f"is {samples[0]:g} throughout: a sensor that does not speak, or a manoeuvre without it."
+            message = f"is constant at {samples[0]:g}: the sensor does not work, or the manoeuvre does not excite it."
             findings.append(LogFinding("note", name, message, {"value": float(samples[0])}))
             continue
         coarse = _resolution(samples)
@@ -45,12 +45,12 @@ def check_samples(log: LogView) -> list[LogFinding]:
 
 
 def _told(findings: list[LogFinding]) -> list[LogFinding]:
-    """Findings that need no warning."""
+    """Return the findings with warnings lowered to notes."""
     return [one._replace(severity="note") if one.severity == "warning" else one for one in findings]
 
 
 def _resting(log: LogView, time: np.ndarray) -> np.ndarray:
-    """Whether the car stands, as far as is known, at these times."""
+    """Whether the car stands at these times, as far as the log shows."""
     if not log.has("v_x"):
         return np.zeros(time.shape, bool)
     speed, known = log.channels["v_x"], np.isfinite(log.channels["v_x"])
@@ -58,7 +58,7 @@ def _resting(log: LogView, time: np.ndarray) -> np.ndarray:
 
 
 def _resolution(samples: np.ndarray) -> float:
-    """The step of a coarsely quantised channel: every change is a multiple of it; 0 where there is none."""
+    """Return the step of a coarsely quantised channel, whose changes are multiples of it; 0 if there is none."""
     changes = np.abs(np.diff(samples))
     changes = changes[changes > 0]
     step = changes.min()
@@ -75,7 +75,7 @@ def _repeats(name: str, time: np.ndarray, samples: np.ndarray, coarse: float, re
     if coarse:
         if share <= HELD:
             return []
-        message = f"comes in steps of {coarse:.3g}: finer detail is lost, and so are {share:.0%} of its changes."
+        message = f"is quantised in steps of {coarse:.3g}: finer detail is lost, and so are {share:.0%} of its changes."
         return [LogFinding("note", name, message, {"resolution": coarse, "repeated": share})]
     findings = []
     ends = np.minimum(starts + lengths - 1, samples.size - 1)
@@ -84,15 +84,15 @@ def _repeats(name: str, time: np.ndarray, samples: np.ndarray, coarse: float, re
     if frozen.any():
         worst = int(np.argmax(durations))
         message = (
-            f"stands still {int(frozen.sum())} time(s) for more than {FROZEN:g} s, the longest {durations[worst]:.4g} s "
-            f"at {time[starts[worst]]:.6g} s: a dropout that repeats the last value? Blank those rows."
+            f"stays constant {int(frozen.sum())} time(s) for more than {FROZEN:g} s, the longest {durations[worst]:.4g} s "
+            f"at {time[starts[worst]]:.6g} s: a dropout that repeats the last value? Set those rows to NaN."
         )
         values = {"count": float(frozen.sum()), "longest": float(durations[worst]), "time": float(time[starts[worst]])}
         findings.append(LogFinding("warning", name, message, values))
     moving = ~frozen
     repeated = 1 - moving.sum() / lengths[moving].sum()
     if repeated > HELD:
-        message = f"repeats {repeated:.0%} of its samples: new values come at about {rate * (1 - repeated):.3g} Hz."
+        message = f"repeats {repeated:.0%} of its samples: its true rate is about {rate * (1 - repeated):.3g} Hz."
         findings.append(
             LogFinding("note", name, message, {"repeated": float(repeated), "rate": float(rate * (1 - repeated))})
         )
@@ -100,7 +100,7 @@ def _repeats(name: str, time: np.ndarray, samples: np.ndarray, coarse: float, re
 
 
 def _spikes(name: str, time: np.ndarray, samples: np.ndarray) -> list[LogFinding]:
-    """Hampel's identifier with the deviation of the whole channel: up to three samples far off their neighbours."""
+    """Find spikes of up to three samples by Hampel's identifier, with the deviation of the whole channel."""
     width = 2 * _HALF_WINDOW + 1
     if samples.size <= width:
         return []
@@ -115,7 +115,7 @@ def _spikes(name: str, time: np.ndarray, samples: np.ndarray) -> list[LogFinding
     worst = int(np.argmax(off))
     message = (
         f"{int(found.sum())} spike(s), the largest {samples[worst]:.4g} at {time[worst]:.6g} s where its neighbours "
-        f"say {median[worst]:.4g}. Blank them, or use a heavy-tailed noise law."
+        f"have {median[worst]:.4g}. Set them to NaN, or use a heavy-tailed noise law."
     )
     values = {"count": float(found.sum()), "time": float(time[worst]), "value": float(samples[worst])}
     return [LogFinding("warning", name, message, values)]

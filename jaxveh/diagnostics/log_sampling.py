@@ -1,4 +1,4 @@
-"""When a log speaks: rates, jitter, gaps, missing and infinite samples."""
+"""Checks of the sampling of a log: rates, jitter, gaps, missing and infinite samples."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ GAP = 2.5
 """A step longer than this many usual steps is a gap."""
 
 SLOWEST = 2.0
-"""s between rows: nothing that a car does can be seen at such steps."""
+"""Step above which the motion of a car cannot be observed, s."""
 
 LONG = 10.0
-"""s: a gap longer than this is hardly a sensor's."""
+"""A gap longer than this is probably not due to a sensor, s."""
 
 JITTER = 0.05
-"""Spread of the steps, as a share of the usual one, above which sampling is called irregular."""
+"""Standard deviation of the steps over the usual step above which sampling is called uneven."""
 
 
 def check_sampling(log: LogView) -> list[LogFinding]:
-    """Rate, jitter and gaps of each raster (channels that speak in the same rows), and samples that are no numbers."""
+    """Check rate, jitter and gaps of each raster (channels with samples in the same rows), and infinite or missing samples."""
     findings, rasters = [], {}
     for name, values in log.channels.items():
         infinite = int(np.isinf(values).sum())
@@ -41,20 +41,21 @@ def check_sampling(log: LogView) -> list[LogFinding]:
 
 def _raster(label: str, time: np.ndarray, missing: float) -> list[LogFinding]:
     if time.size < 3:
-        return [LogFinding("error", label, f"holds only {time.size} sample(s).", {"count": time.size})]
+        return [LogFinding("error", label, f"has only {time.size} sample(s).", {"count": time.size})]
     steps = np.diff(time)
     usual = float(np.median(steps))
     if usual >= SLOWEST:
-        message = f"steps by {usual:.4g} s: no car is so slow; it looks like milliseconds. Say so in the channel map."
+        message = f"has steps of {usual:.4g} s, too long for a car; it looks like milliseconds. Set the unit in the channel map."
         return [LogFinding("error", label, message, {"step": usual})]
     gaps = steps > GAP * usual
     jitter = float(np.std(steps[~gaps]) / usual)
     values = {"rate": 1 / usual, "jitter": jitter, "missing": missing, "samples": float(time.size)}
-    quiet = f" (silent in {missing:.0%} of the log's rows)" if missing else ""
-    regular = LogFinding("ok", label, f"speaks every {usual * 1e3:.4g} ms, {1 / usual:.4g} Hz{quiet}.", values)
+    quiet = f" (missing in {missing:.0%} of the log's rows)" if missing else ""
+    regular = LogFinding("ok", label, f"is sampled every {usual * 1e3:.4g} ms, {1 / usual:.4g} Hz{quiet}.", values)
     if jitter > JITTER:
         words = (
-            f"speaks at {1 / usual:.4g} Hz on average{quiet}, unevenly: steps spread by {jitter:.0%} of the usual one."
+            f"is sampled at {1 / usual:.4g} Hz on average{quiet}, unevenly: the steps' standard deviation is {jitter:.0%} of the "
+            "usual step."
         )
         regular = LogFinding("note", label, words, values)
     if not gaps.any():
@@ -65,7 +66,7 @@ def _raster(label: str, time: np.ndarray, missing: float) -> list[LogFinding]:
         f"{steps[gaps].sum():.4g} s. Filters predict across them; fill inputs with recording.fill."
     )
     if steps[longest] > LONG:
-        message += " A clock that jumped, or two drives in one log? Estimates begin anew after it."
+        message += " A clock that jumped, or two drives in one log? Estimates restart after it."
     return [
         regular,
         LogFinding(

@@ -1,4 +1,4 @@
-"""Signs and units, from what must agree: steer with yaw rate, accelerations with speeds."""
+"""Checks of signs and units from channels that must agree: steer with yaw rate, accelerations with speeds."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import numpy as np
 from jaxveh.diagnostics.log_findings import GRAVITY, LogFinding, LogView, fit
 
 AGREE = 0.5
-"""Correlation above which two channels are said to tell the same story."""
+"""Correlation above which two channels count as related."""
 
 SCALED = 0.8
-"""Correlation above which a slope other than 1 is put down to a unit: below it a channel may be damaged, or late."""
+"""Correlation above which a slope other than 1 is attributed to a unit; below it a channel may be damaged or late."""
 
-# What a slope other than 1 means, for a_y over v_x yaw_rate and for a_x over dv_x/dt.
+# The units that explain a slope other than 1, for a_y over v_x yaw_rate and for a_x over dv_x/dt.
 _LATERAL = {
     1 / 3.6: ("v_x", "km/h"),
     0.44704: ("v_x", "mph"),
@@ -32,7 +32,7 @@ _LIMITS = {
 
 
 def check_units(log: LogView) -> list[LogFinding]:
-    """Magnitudes that no car reaches in SI units (99.5 % quantile, so that spikes do not count)."""
+    """Check for magnitudes that no car reaches in SI units (99.5 % quantile, so that spikes do not count)."""
     findings = []
     for name, (limit, unit, likely) in _LIMITS.items():
         if not log.has(name):
@@ -40,7 +40,9 @@ def check_units(log: LogView) -> list[LogFinding]:
         values = log.channels[name]
         size = float(np.quantile(np.abs(values[np.isfinite(values)]), 0.995))
         if size > limit:
-            message = f"reaches {size:.4g}: too much for {unit}; it looks like {likely}. Say so in the channel map."
+            message = (
+                f"reaches {size:.4g}: too much for {unit}; it looks like {likely}. Set the unit in the channel map."
+            )
             findings.append(LogFinding("error", name, message, {"size": size, "limit": limit}))
         else:
             findings.append(LogFinding("ok", name, f"reaches {size:.4g} {unit}.", {"size": size, "limit": limit}))
@@ -48,7 +50,7 @@ def check_units(log: LogView) -> list[LogFinding]:
 
 
 def check_wheel_speeds(log: LogView) -> list[LogFinding]:
-    """Whether v_x is what the wheels' circumferences say."""
+    """Check whether v_x agrees with the wheel speeds."""
     ratio = _wheels_over_speed(log)
     if ratio is None:
         return []
@@ -57,7 +59,7 @@ def check_wheel_speeds(log: LogView) -> list[LogFinding]:
         return [LogFinding("ok", "v_x", f"{story}.", values)]
     for factor, unit in ((1 / 3.6, "km/h"), (0.44704, "mph")):
         if abs(np.log(ratio / factor)) < np.log(1.15):
-            return [LogFinding("error", "v_x", f"{story}: v_x looks like {unit}. Say so in the channel map.", values)]
+            return [LogFinding("error", "v_x", f"{story}: v_x looks like {unit}. Set it in the channel map.", values)]
     return [LogFinding("warning", "v_x", f"{story}, which should be 1: the wheels in rad/s or km/h?", values)]
 
 
@@ -65,7 +67,7 @@ _SAME = (0.8, 1.25)
 
 
 def _wheels_over_speed(log: LogView) -> float | None:
-    """The median of all wheels' speeds over v_x in the rows that move; None where there are too few."""
+    """Return the median of all wheel speeds over v_x in moving rows; None if there are too few rows."""
     wheels = [values for name, values in log.channels.items() if name.startswith("wheel_speed")]
     if not wheels or not log.has("v_x"):
         return None
@@ -77,7 +79,7 @@ def _wheels_over_speed(log: LogView) -> float | None:
 
 
 def check_signs(log: LogView) -> list[LogFinding]:
-    """Whether steer, yaw rate and lateral acceleration turn the same way, and the accelerations follow the speeds."""
+    """Check whether the signs of steer, yaw rate and lateral acceleration agree, and the accelerations follow the speeds."""
     findings = []
     steering = _correlation(log) if log.has("steer", "yaw_rate", "v_x") else None
     lateral = _lateral(log) if log.has("v_x", "yaw_rate", "a_y") else None
@@ -91,7 +93,7 @@ def check_signs(log: LogView) -> list[LogFinding]:
         findings.append(_slope("a_x", "dv_x/dt", _longitudinal(log), _LONGITUDINAL, "a_x"))
     wheels = _wheels_over_speed(log)
     if wheels is not None and _SAME[0] < wheels < _SAME[1]:
-        # Accelerations that were planned, not measured, must not make a speed that the wheels confirm wrong.
+        # Accelerations that were planned, not measured, must not refute a speed that the wheels confirm.
         sure = lambda one: one.severity == "error" and one.channel == "v_x"
         return [one._replace(severity="warning") if sure(one) else one for one in findings]
     return findings
@@ -104,7 +106,7 @@ def _correlation(log: LogView) -> float:
 
 
 def _lateral(log: LogView) -> tuple[float, float, float]:
-    """Slope, intercept and correlation of a_y over v_x yaw_rate."""
+    """Return slope, intercept and correlation of a_y over v_x yaw_rate."""
     speed, yaw_rate = log.even("v_x"), log.even("yaw_rate")
     target = log.while_moving(log.smooth(log.even("a_y"), 0.2))
     turning = log.smooth(speed * yaw_rate, 0.2)
@@ -113,7 +115,7 @@ def _lateral(log: LogView) -> tuple[float, float, float]:
 
 
 def _sideways(log: LogView) -> list[LogFinding]:
-    """Whether dv_y/dt is what v_x yaw_rate leaves of a_y; silent where the two have little in common."""
+    """Check whether dv_y/dt follows a_y - v_x yaw_rate; there is no finding if the two are hardly correlated."""
     rest = log.smooth(log.even("a_y") - log.even("v_x") * log.even("yaw_rate"), 0.3)
     change = log.while_moving(log.smooth(log.slope(log.even("v_y")), 0.3))
     coefficients, _, correlation = fit(change, rest)
@@ -122,9 +124,9 @@ def _sideways(log: LogView) -> list[LogFinding]:
     if correlation < AGREE:
         return []
     if slope < 0:
-        message = "moves against a_y - v_x yaw_rate: v_y has the wrong sign. Left is positive; set sign = -1."
+        message = "has a rate opposite to a_y - v_x yaw_rate: v_y has the wrong sign. Left is positive; set sign = -1."
         return [LogFinding("error", "v_y", message, values)]
-    return [LogFinding("ok", "v_y", f"moves as a_y - v_x yaw_rate says (correlation {correlation:.2f}).", values)]
+    return [LogFinding("ok", "v_y", f"agrees with a_y - v_x yaw_rate (correlation {correlation:.2f}).", values)]
 
 
 def _longitudinal(log: LogView) -> tuple[float, float, float]:
@@ -140,9 +142,7 @@ def _longitudinal(log: LogView) -> tuple[float, float, float]:
 def _steering(correlation: float, lateral: tuple[float, float, float] | None) -> LogFinding:
     values = {"correlation": correlation}
     if correlation > AGREE:
-        return LogFinding(
-            "ok", "steer", f"turns the car the way yaw_rate says (correlation {correlation:.2f}).", values
-        )
+        return LogFinding("ok", "steer", f"agrees in sign with yaw_rate (correlation {correlation:.2f}).", values)
     if correlation > -AGREE:
         message = (
             f"has little to do with yaw_rate (correlation {correlation:.2f}): too little steering, or wrong columns?"
@@ -182,5 +182,5 @@ def _slope(name: str, other: str, line: tuple[float, float, float], table: dict,
     if factors:
         nearest = min(factors, key=lambda factor: abs(np.log(slope / factor)))
         channel, unit = factors[nearest]
-        return LogFinding("error", channel, f"{story}: {channel} looks like {unit}. Say so in the channel map.", values)
+        return LogFinding("error", channel, f"{story}: {channel} looks like {unit}. Set it in the channel map.", values)
     return LogFinding("warning", name, f"{story}, which should be 1: a wrong unit or scale in one of them?", values)

@@ -1,4 +1,4 @@
-"""The linear single track, in NumPy, as what a sound log of a known car should look like."""
+"""The linear single track in NumPy, the reference for checks of a log of a known car."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from jaxveh.io import CarSpecification
 
 SLOW = 3.0
-"""m/s below which the lateral motion is held at zero."""
+"""Speed below which the lateral motion is held at zero, m/s."""
 
 
 def yaw_rate_from_steer(car: CarSpecification, steer: np.ndarray, v_x: np.ndarray, step: float) -> np.ndarray:
-    """Yaw rate (N,) in rad/s of the linear single track driven by steer (N,) in rad at v_x (N,) in m/s, every `step` s.
+    """Return the yaw rate (N,) in rad/s of the linear single track for steer (N,) in rad at v_x (N,) in m/s, every `step` s.
 
-    Implicit Euler, so that no speed makes it unstable. NaN inputs give NaN rows, and the motion starts anew after them.
+    Implicit Euler is stable at every speed. NaN inputs give NaN rows, and the motion starts again from zero after them.
     """
     m, I_z, a, b = car.mass, car.yaw_inertia, car.front_axle_to_cg, car.rear_axle_to_cg
     C_f, C_r = float(car.front_cornering_stiffness or 0), float(car.rear_cornering_stiffness or 0)
@@ -35,11 +35,11 @@ def yaw_rate_from_steer(car: CarSpecification, steer: np.ndarray, v_x: np.ndarra
 
 
 def a_y_from_yaw_rate(car: CarSpecification, yaw_rate: np.ndarray, v_x: np.ndarray, step: float) -> np.ndarray:
-    """Lateral acceleration (N,) in m/s^2 that belongs to a yaw rate (N,) in rad/s where the rear axle is linear.
+    """Return the lateral acceleration (N,) in m/s^2 that belongs to a yaw rate (N,) in rad/s if the rear axle is linear.
 
-    The rear axle carries (a m a_y - I_z dr/dt) / L, which gives its slip angle and so v_y; hence
+    The rear axle carries (a m a_y - I_z dr/dt) / L, which gives its slip angle and thus v_y; hence
     a_y = v_x r + dv_y/dt with v_y = b r - v_x (a m a_y - I_z dr/dt) / (L C_r): v_x r + b dr/dt, delayed by about
-    v_x a m / (L C_r) seconds. Needs finite inputs; the inertial term is small and left out.
+    v_x a m / (L C_r) seconds. Inputs must be finite; the inertial term is small and omitted.
     """
     delay = v_x * car.front_axle_to_cg * car.mass / (car.wheelbase * float(car.rear_cornering_stiffness or 0))
     drive = v_x * yaw_rate + car.rear_axle_to_cg * np.gradient(yaw_rate, step)
@@ -53,7 +53,7 @@ def a_y_from_yaw_rate(car: CarSpecification, yaw_rate: np.ndarray, v_x: np.ndarr
 
 
 def understeer_gradient(car: CarSpecification) -> float:
-    """Steer at the road wheels over lateral acceleration beyond the geometric part, rad per m/s^2."""
+    """Return the steer at the road wheels beyond the geometric part per lateral acceleration, rad per m/s^2."""
     a, b, C_f, C_r = (
         car.front_axle_to_cg,
         car.rear_axle_to_cg,

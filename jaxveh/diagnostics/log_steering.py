@@ -1,4 +1,4 @@
-"""The steer channel against the car: scale, offset, understeer; and biases at standstill."""
+"""Checks of the steer channel against the car (scale, offset, understeer), and of biases at standstill."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from jaxveh.diagnostics.log_findings import GRAVITY, LogFinding, LogView, fit
 from jaxveh.diagnostics.log_single_track import understeer_gradient
 
 GENTLE = 3.0
-"""m/s^2 of lateral acceleration up to which tyres count as linear."""
+"""Lateral acceleration up to which tyres count as linear, m/s^2."""
 
 USUAL_WHEELBASE = 2.7
-"""m, where the car is not known."""
+"""Assumed wheelbase of an unknown car, m."""
 
 OFFSET = np.deg2rad(0.2)
-"""Steering offset worth a warning."""
+"""Steering offset above which there is a warning, rad."""
 
 STANDSTILL = 0.1
-"""m/s below which a car stands."""
+"""Speed below which a car counts as standing, m/s."""
 
 _YAW_RATE_BIAS = 0.003
 
 
 def check_steering(log: LogView) -> list[LogFinding]:
-    """Scale of steer against the geometry, its offset when the car runs straight, and the understeer gradient."""
+    """Check the scale of steer against the geometry, its offset when the car runs straight, and the understeer gradient."""
     findings = _standstill(log) if log.has("v_x", "yaw_rate") else []
     if not log.has("steer", "yaw_rate", "v_x"):
         return findings
@@ -33,7 +33,7 @@ def check_steering(log: LogView) -> list[LogFinding]:
         bend, push = yaw_rate / speed, yaw_rate * speed
         bend = np.where(np.abs(push) < GENTLE, bend, np.nan)
     if np.isfinite(bend * steer).sum() * log.step < 3.0:
-        message = f"less than 3 s of driving below {GENTLE:g} m/s^2 laterally: offset and scale cannot be judged."
+        message = f"less than 3 s of driving below {GENTLE:g} m/s^2 of lateral acceleration: offset and scale are not checked."
         return [*findings, LogFinding("note", "steer", message, {})]
     scale = _scale(log, steer, bend, push)
     findings.append(scale)
@@ -48,11 +48,11 @@ def _scale(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) 
     coefficients, _, correlation = fit(steer, wheelbase * bend + understeer * push)
     scale = float(coefficients[1])
     values = {"scale": scale, "correlation": correlation}
-    # Wide, for stiffnesses may be wrong by a factor of two; units and steering ratios are wrong by more.
+    # The range is wide because stiffnesses may be wrong by a factor of two; wrong units and steering ratios give larger errors.
     low, high = (0.35, 4.0) if car is None else (0.4, 2.5)
-    against = f"a wheelbase of {USUAL_WHEELBASE:g} m, taken for granted," if car is None else "the car"
+    against = f"a car with an assumed wheelbase of {USUAL_WHEELBASE:g} m" if car is None else "the car"
     if correlation < 0.5 or scale <= 0:
-        message = f"does not follow what yaw_rate and speed need (correlation {correlation:.2f})."
+        message = f"does not follow the steer that yaw_rate and speed need (correlation {correlation:.2f})."
         return LogFinding("note", "steer", message, values)
     if low <= scale <= high:
         return LogFinding("ok", "steer", f"is {scale:.2f} times what {against} needs in gentle turns.", values)
@@ -71,7 +71,7 @@ def _scale(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) 
 
 
 def _offset(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) -> list[LogFinding]:
-    """Steer is offset + L yaw_rate / v_x + K v_x yaw_rate; L is the car's, or fitted where the car is not known."""
+    """Fit steer = offset + L yaw_rate / v_x + K v_x yaw_rate; L is that of the car, or is fitted if the car is unknown."""
     if log.car is None:
         coefficients, errors, _ = fit(steer, bend, push)
     else:
@@ -82,22 +82,22 @@ def _offset(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray)
     values = {"offset": offset, "error": error}
     words = f"shows {np.rad2deg(offset):+.2f} degrees (+-{np.rad2deg(2 * error):.2f}) when the car runs straight"
     if told:
-        words += f", the car's file says {np.rad2deg(told):+.2f}"
+        words += f"; the car file has {np.rad2deg(told):+.2f}"
     findings = [LogFinding("ok", "steer", f"{words}.", values)]
     if abs(rest) > max(OFFSET, 3 * error):
         advice = "subtract it in the channel map, set steer_offset in the car's file, or let calibration estimate it"
-        findings = [LogFinding("warning", "steer", f"{words}: {advice} (a yaw-rate bias looks alike).", values)]
+        findings = [LogFinding("warning", "steer", f"{words}: {advice} (a yaw-rate bias has the same effect).", values)]
     if log.car is None:
         return findings
     measured, expected, spread = float(coefficients[1]), understeer_gradient(log.car), float(errors[1])
     values = {"measured": measured, "expected": expected, "error": spread}
     words = (
-        f"understeer gradient of {_degrees_a_g(measured):+.2f} degrees a g (+-{_degrees_a_g(2 * spread):.2f}); the car's "
-        f"stiffnesses make it {_degrees_a_g(expected):+.2f}."
+        f"understeer gradient of {_degrees_a_g(measured):+.2f} degrees per g (+-{_degrees_a_g(2 * spread):.2f}); the car's "
+        f"stiffnesses give {_degrees_a_g(expected):+.2f}."
     )
     off = abs(measured - expected)
     far = _degrees_a_g(off) > 1.5 and off > 3 * spread
-    advice = " Are stiffnesses, masses and axle distances right?"
+    advice = " Check stiffnesses, masses and axle distances."
     return [*findings, LogFinding("warning" if far else "ok", "steer", words + (advice if far else ""), values)]
 
 

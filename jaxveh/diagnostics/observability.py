@@ -1,4 +1,4 @@
-"""What a recording can tell about parameters at all: Fisher information, Cramer-Rao bounds, unobservable directions."""
+"""The observability of parameters from a recording: Fisher information, Cramer-Rao bounds, unobservable directions."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from jaxveh._core.errors import FilterError, InputError, check_positive
 from jaxveh._core.parameters import Parameters
 
 UNOBSERVABLE = 1e9
-"""Prior-scaled condition number of the information above which the report speaks of unobservable parameters."""
+"""Prior-scaled condition number of the information above which the report calls the parameters unobservable."""
 
 
 class Observability(NamedTuple):
-    """Fisher information of named parameters, whitened by noise and scaled by the prior's spread.
+    """Fisher information of named parameters, whitened by noise and scaled by the prior's standard deviations.
 
-    By name, `Parameters` as those of an estimate (`.front.B`): `spread`, the prior's standard deviations; `bounds`,
-    Cramer-Rao bounds of the standard deviations, all parameters unknown, in the parameters' own units on the real line
+    By name, as `Parameters` like those of an estimate (`.front.B`): `spread`, the prior's standard deviations; `bounds`,
+    Cramer-Rao bounds of the standard deviations if all parameters are unknown, in the parameters' own units on the real line
     (0.05: five per cent for a positive parameter); `bounds_alone`, each with the others known; `bounds_with_prior`, with
     the prior's information added.
 
-    In the order of `names` (p,): `information` (p, p) in units of the prior (1 on the diagonal: as much as the prior
-    knows); `singular_values` (p,) of the scaled sensitivities, descending; `condition_number`: of the information, the
+    In the order of `names` (p,): `information` (p, p) in units of the prior (1 on the diagonal: as much as in the
+    prior); `singular_values` (p,) of the scaled sensitivities, descending; `condition_number`: of the information, the
     square of the ratio of the extreme singular values; `directions` (p, p): rows are the right singular vectors in units
     of the prior, the last the least observable.
     """
@@ -40,22 +40,22 @@ class Observability(NamedTuple):
     directions: np.ndarray
 
     def observable(self, share: float = 0.1) -> tuple[str, ...]:
-        """The parameters whose Cramer-Rao bound, all others unknown, is at most `share` of the prior's spread."""
+        """Return the parameters whose Cramer-Rao bound, with all others unknown, is at most `share` of the prior's spread."""
         return tuple(name for name in self.names if self.bounds[name] <= share * self.spread[name])
 
     def unobservable(self, share: float = 1.0) -> tuple[str, ...]:
-        """The parameters whose bound is no better than `share` of the prior's spread: the recording tells nothing new."""
+        """Return the parameters whose bound is above `share` of the prior's spread: the recording adds no information."""
         return tuple(name for name in self.names if not self.bounds[name] <= share * self.spread[name])
 
     def trade(self) -> str:
-        """The least observable direction in words."""
+        """Describe the least observable direction in words."""
         direction = self.directions[-1]
         order = np.argsort(-np.abs(direction))
         share = np.abs(direction[order]) / np.abs(direction[order[0]])
         main = [i for i, s in zip(order, share, strict=True) if s >= 0.3][:4]
         first = self.names[main[0]]
         if len(main) == 1:
-            return f"{first} alone leaves no trace in the measurements"
+            return f"{first} alone has no effect on the measurements"
         up = [self.names[i] for i in main[1:] if direction[i] * direction[main[0]] > 0]
         down = [self.names[i] for i in main[1:] if direction[i] * direction[main[0]] < 0]
         parts = [f"{_list(up)} rising with it" if up else "", f"{_list(down)} falling" if down else ""]
@@ -64,7 +64,7 @@ class Observability(NamedTuple):
         )
 
     def report(self) -> str:
-        """The findings in words, a line each."""
+        """Return the findings in words, one line each."""
         lines = [f"condition number of the information, scaled by the prior: {self.condition_number:.1e}"]
         for name in self.names:
             bound, alone, spread = self.bounds[name], self.bounds_alone[name], self.spread[name]
@@ -86,15 +86,15 @@ def _list(names) -> str:
 def observability_at(
     predict: Callable[[jax.Array], jax.Array], at: jax.Array, names: tuple[str, ...], spread, nuisance: int = 0
 ) -> Observability:
-    """The observability of parameters from whitened predictions.
+    """Compute the observability of parameters from whitened predictions.
 
     **Arguments**: `predict(z) -> (R,)`: every predicted measurement over its noise's standard deviation, for
-    parameters `z` (p + nuisance,) on the real line; `at`: where the sensitivities are taken; `names` (p,); `spread`
-    (p + nuisance,): the prior's standard deviations. The last `nuisance` entries of z (start states) are unknown
-    too, known as well as the prior says, and are marginalised.
+    parameters `z` (p + nuisance,) on the real line; `at`: the point of the sensitivities; `names` (p,); `spread`
+    (p + nuisance,): the prior's standard deviations. The last `nuisance` entries of z (start states) are also unknown,
+    with the prior's uncertainty, and are marginalised.
 
-    **Raises** `InputError` for shapes that do not agree; `FilterError` where the prediction diverges. Use float64:
-    condition numbers above 1e7 mean nothing in float32.
+    **Raises** `InputError` for shapes that do not agree; `FilterError` if the prediction diverges. Use float64:
+    condition numbers above 1e7 have no meaning in float32.
     """
     spread, count = np.asarray(spread, dtype=np.float64), len(names)
     if at.shape != (count + nuisance,) or spread.shape != at.shape:
@@ -107,7 +107,7 @@ def observability_at(
 
 
 def _marginal(jacobian: np.ndarray, count: int) -> np.ndarray:
-    """Sensitivities of the first `count` columns with the others, known as well as the prior says, projected out."""
+    """Return the sensitivities of the first `count` columns; the others, uncertain as in the prior, are projected out."""
     nuisance = jacobian.shape[1] - count
     if nuisance == 0:
         return jacobian
@@ -118,15 +118,15 @@ def _marginal(jacobian: np.ndarray, count: int) -> np.ndarray:
 
 
 def from_sensitivities(jacobian: np.ndarray, names: tuple[str, ...], spread: np.ndarray) -> Observability:
-    """The report from prior-scaled, whitened sensitivities (R, p)."""
-    # Fewer measurements than parameters: rows of zeros make room for the directions that nothing sees.
+    """Compute the result from prior-scaled, whitened sensitivities (R, p)."""
+    # With fewer measurements than parameters, rows of zeros are added for the directions without any measurement.
     jacobian = np.vstack([jacobian, np.zeros((max(0, len(names) - len(jacobian)), len(names)))])
-    # Through the singular values of the sensitivities, never of the information: that would square the condition.
+    # From the singular values of the sensitivities, because those of the information would square the condition number.
     _, values, directions = np.linalg.svd(jacobian, full_matrices=False)
     floor = np.finfo(np.float64).tiny
     safe = np.maximum(values, floor)
     alone = np.linalg.norm(jacobian, axis=0)
-    with np.errstate(over="ignore"):  # a direction without any trace has an infinite bound
+    with np.errstate(over="ignore"):  # a direction without any effect has an infinite bound
         ratio, reach = (safe[0] / safe[-1]) ** 2, np.sum((directions / safe[:, None]) ** 2, axis=0)
     by_name = lambda values: Parameters(dict(zip(names, values, strict=True)))
     return Observability(

@@ -1,4 +1,4 @@
-"""How a particle filter's particles fared."""
+"""The health of a particle filter's particles."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from jaxveh.diagnostics.innovations import by_runs_and_rows
 class ParticleHealth(NamedTuple):
     """Effective sample sizes as shares of the particles, over rows (and runs).
 
-    `particles`: N; `lowest`, `median`, and `worst_row`, that of the lowest; `quantiles`: a mapping from share of rows to the
-    effective share that so many rows stay below; `share_below`: of rows with less than `threshold`; `result`, `failed_at`: the
-    first failing code and its row, as in `Estimate`, 0 and -1 where all went well.
+    `particles`: N; `lowest`, `median`, and `worst_row`, the row of the lowest; `quantiles`: a mapping from a share of rows to the
+    quantile of the effective shares; `share_below`: the share of rows below `threshold`; `result`, `failed_at`: the
+    first failing code and its row, as in `Estimate`, 0 and -1 without a failure.
     """
 
     particles: int
@@ -36,11 +36,11 @@ class ParticleHealth(NamedTuple):
 
 
 def particle_health(estimate: Any, threshold: float = 0.1, particles: int | None = None) -> ParticleHealth:
-    """The health of the particles behind an estimate.
+    """Return the health of the particles behind an estimate.
 
     **Arguments**: `estimate` of a particle filter, with (T,) or (R, T) leaves in its `info`; `threshold`: the effective share
-    below which a row counts as poor (0.1 is ours: below it a few particles speak for all); `particles`: N, where the estimate's
-    belief does not have weights that tell.
+    below which a row counts as poor (0.1 is our choice: below it a few particles carry nearly all weight); `particles`: N, needed
+    if the estimate's belief has no weights.
 
     **Raises** `InputError` for other filters, which have no effective sample size.
     """
@@ -49,7 +49,7 @@ def particle_health(estimate: Any, threshold: float = 0.1, particles: int | None
         weights = getattr(getattr(estimate, "belief", None), "weights", None)
         if weights is None:
             raise InputError(
-                "particle_health: the estimate's belief has no weights; only particle filters' do. Or give particles=."
+                "particle_health: the estimate's belief has no weights; only those of particle filters do. Or give particles=."
             )
         particles = int(weights.shape[-1])
     share = by_runs_and_rows(estimate.info.ess) / particles
@@ -75,29 +75,32 @@ def particle_health(estimate: Any, threshold: float = 0.1, particles: int | None
 
 
 class Ancestry(NamedTuple):
-    """Who descends from whom, (T,) each: `parents`: how many of the row before have descendants in this row (N in the first);
-    `surviving`: how many of this row have descendants in the last."""
+    """The ancestry of particles, (T,) each.
+
+    `parents`: number of particles of the previous row with descendants in this row (N in the first); `surviving`: number of
+    particles of this row with descendants in the last row.
+    """
 
     parents: np.ndarray
     surviving: np.ndarray
 
     @property
     def coalescence(self) -> int:
-        """Rows before the last at which all of its particles have one ancestor; -1 where they never do."""
+        """Number of rows before the last in which all of its particles have one common ancestor; -1 if there is none."""
         single = np.flatnonzero(self.surviving == 1)
         return -1 if single.size == 0 else int(len(self.surviving) - 1 - single[-1])
 
 
 def ancestry(ancestors: Any) -> Ancestry:
-    """The degeneracy of a particle filter's paths.
+    """Return the degeneracy of a particle filter's paths.
 
-    **Arguments**: `ancestors` (T, N): which particle of the row before each came from, as in `ParticleBelief.ancestors` of every
-    row (`filters.run_and_keep`); the first row's are not read.
+    **Arguments**: `ancestors` (T, N): the parent of each particle in the previous row, as in `ParticleBelief.ancestors` of every
+    row (`filters.run_and_keep`); those of the first row are not used.
 
-    Few `surviving` far back is normal (P. Jacob, L. Murray & S. Rubenthaler 2015: all paths meet within some N log N rows) and
-    says that what is smoothed there rests on few particles. Few `parents` says that a single measurement decided.
+    Few `surviving` particles far back are normal (P. Jacob, L. Murray & S. Rubenthaler 2015: all paths meet within some N log N
+    rows); a smoothed estimate there depends on few particles. Few `parents` mean that one measurement removed most particles.
 
-    **Raises** `InputError` for another shape, or numbers that are not those of particles.
+    **Raises** `InputError` for another shape, or indices out of range.
     """
     ancestors = np.asarray(ancestors)
     if ancestors.ndim != 2 or not np.issubdtype(ancestors.dtype, np.integer):

@@ -1,4 +1,4 @@
-"""How good an estimate is: errors, bands and their worth, of an estimate and of a baseline beside it."""
+"""Scores of an estimate: errors, coverage of its bands, and the value of the bands."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 from jaxveh._core.errors import InputError
 
 NORMAL_HALF, NORMAL_95 = 0.6744897501960817, 1.959963984540054
-"""Half the widths of the central 50 and 95 % of a standard normal law."""
+"""Half the widths of the central 50 and 95 % intervals of a standard normal distribution."""
 
 
 class Score(NamedTuple):
-    """How an estimate fares against a reference, in the reference's unit.
+    """The score of an estimate against a reference, in the reference's unit.
 
     - `rmse`; `constant`: the mean of the error, such as a reference's misalignment, and `rmse_without_constant`: without it;
       `worst`: the largest absolute error.
     - `coverage_50`, `coverage_95`: shares of rows inside the central bands; `crps`: the continuous ranked probability score, the
-      lower the better; `crps_constant`: that of the same mean with the one constant standard deviation that suits it best. NaN
+      lower the better; `crps_constant`: that of the same mean with its best constant standard deviation. All are NaN
       for an estimate without standard deviations.
-    - `rows`: how many were scored.
+    - `rows`: the number of scored rows.
     """
 
     rmse: float
@@ -38,9 +38,9 @@ class Score(NamedTuple):
 def score_band(
     reference: np.ndarray, mean: np.ndarray, std: np.ndarray | None = None, which: np.ndarray | None = None
 ) -> Score:
-    """`mean` and `std` (T,) against a `reference` (T,), over its finite rows, of those `which` (T,) says.
+    """Score `mean` and `std` (T,) against a `reference` (T,), over its finite rows, and of those only the rows in `which` (T,).
 
-    **Raises** `InputError` where no row is left.
+    **Raises** `InputError` if no row is left.
     """
     known = np.isfinite(reference) if which is None else np.isfinite(reference) & which
     if not known.any():
@@ -64,8 +64,10 @@ def score_band(
 
 
 def _crps(away: np.ndarray) -> np.ndarray:
-    """The score of a standard normal law at a distance from its mean (T. Gneiting and A. E. Raftery, J. Am. Stat. Assoc. 102
-    (2007), eq. 21)."""
+    """Return the CRPS of a standard normal distribution at a distance from its mean.
+
+    T. Gneiting and A. E. Raftery, J. Am. Stat. Assoc. 102 (2007), eq. 21.
+    """
     density = np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
     below = 0.5 * (1 + _erf(away / math.sqrt(2)))
     return away * (2 * below - 1) + 2 * density - 1 / math.sqrt(math.pi)
@@ -75,11 +77,11 @@ _erf = np.vectorize(math.erf, otypes=[float])
 
 
 def _crps_of_best_constant(error: np.ndarray) -> float:
-    """The least score of a constant standard deviation, among those from a twentieth to twice the errors' root mean square."""
+    """Return the lowest CRPS of a constant standard deviation, between a twentieth of and twice the errors' root mean square."""
     size = float(np.sqrt(np.mean(error**2)))
     if size == 0:
         return 0.0
     widths = size * np.geomspace(0.05, 2.0, 30)
-    # Sorted errors, thinned: the score is an integral over their distribution.
+    # Quantiles of the errors suffice: the score is an integral over their distribution.
     some = np.quantile(np.abs(error), (np.arange(500) + 0.5) / 500)
     return float(min(np.mean(width * _crps(some / width)) for width in widths))

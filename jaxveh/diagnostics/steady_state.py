@@ -1,4 +1,4 @@
-"""The numbers of ISO 4138: how the steer grows with the lateral acceleration in steady turns."""
+"""The numbers of ISO 4138: the growth of the steer with the lateral acceleration in steady turns."""
 
 from __future__ import annotations
 
@@ -18,23 +18,25 @@ from jaxveh.diagnostics.drive_channels import (
 )
 
 LINEAR_A_Y = 4.0
-"""m/s^2: the lateral acceleration up to which passenger cars are taken as linear."""
+"""Lateral acceleration up to which passenger cars count as linear, m/s^2."""
 
 SLOWEST = 2.0
-"""m/s: below it nothing is said of turns."""
+"""Speed below which turns are not used, m/s."""
 
 FEWEST = 5
 
 STEADY = 0.5
-"""m/s^3: rows count as steady while the lateral acceleration changes by less in a second; ours."""
+"""Largest rate of the lateral acceleration over a second in a steady row, m/s^3; our choice."""
 
 SETTLED = 1.0
-"""s: how long rows after an unsteady one are left out; ours."""
+"""Time after an unsteady row during which rows are left out, s; our choice."""
 
 
 class SteadyTurns(NamedTuple):
-    """Rows of steady turns, (n,) each: `a_y` (m/s^2), `steer` and `sideslip` (rad), `geometric_steer` = wheelbase times
-    curvature (rad; None without a wheelbase)."""
+    """Rows of steady turns, (n,) each: `a_y` (m/s^2), `steer` and `sideslip` (rad).
+
+    `geometric_steer`: wheelbase times curvature (rad; None without a wheelbase).
+    """
 
     a_y: np.ndarray
     steer: np.ndarray
@@ -43,8 +45,11 @@ class SteadyTurns(NamedTuple):
 
 
 class Understeer(NamedTuple):
-    """Slopes of straight lines through the linear range, rad s^2/m: `gradient` (ISO 4138's understeer gradient at the road
-    wheels: of the steer beyond the geometric one) and `sideslip_gradient`; `rows`: how many were used."""
+    """Slopes of straight lines through the linear range, rad s^2/m.
+
+    `gradient`: ISO 4138's understeer gradient at the road wheels, the slope of the steer beyond the geometric one;
+    `sideslip_gradient`: the slope of the sideslip; `rows`: the number of rows.
+    """
 
     gradient: float
     sideslip_gradient: float
@@ -52,13 +57,13 @@ class Understeer(NamedTuple):
 
 
 def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady: float = STEADY) -> SteadyTurns:
-    """The quasi-steady rows of a drive: a slow ramp of steer, a circle at slowly rising speed.
+    """Return the quasi-steady rows of a drive, such as a slow ramp of steer, or a circle at slowly rising speed.
 
-    Left out are rows below `SLOWEST`, those about which the lateral acceleration changes by more than `steady` (m/s^3) within
-    a second, what follows them within `SETTLED`, and those in gaps of more than `LONGEST_GAP` (0.5 s) of a channel that they
-    are made of. Curvature is `yaw_rate / v_x`.
+    Left out are rows below `SLOWEST`, rows about which the lateral acceleration changes by more than `steady` (m/s^3) within
+    a second, rows within `SETTLED` after those, and rows in gaps of more than `LONGEST_GAP` (0.5 s) in a channel that is
+    used. Curvature is `yaw_rate / v_x`.
 
-    **Raises** `InputError` for a channel that is not there, a wheelbase that is not positive, or where no row is steady.
+    **Raises** `InputError` for a missing channel, a wheelbase that is not positive, or if no row is steady.
     """
     check_positive("steady", steady, "m/s^3")
     v_x = channel(recording, "v_x")
@@ -68,9 +73,9 @@ def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady
         moves &= ~within_gaps(recording, name)
     if not moves.any():
         raise InputError(
-            f"steady_turns: in no row the car is faster than {SLOWEST:g} m/s and its lateral acceleration changes by less than "
-            f"{steady:g} m/s^3, outside gaps of more than {LONGEST_GAP:g} s in {', '.join(sorted(used))}: drive more slowly into "
-            "the turn."
+            f"steady_turns: there is no row in which the car is faster than {SLOWEST:g} m/s and its lateral acceleration changes "
+            f"by less than {steady:g} m/s^3, outside gaps of more than {LONGEST_GAP:g} s in {', '.join(sorted(used))}: drive "
+            "more slowly into the turn."
         )
     geometric = None
     if wheelbase is not None:
@@ -85,7 +90,7 @@ def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady
 
 
 def _is_settled(time: np.ndarray, a_y: np.ndarray, steady: float) -> np.ndarray:
-    """Whether each row, and those of the last `SETTLED` seconds, are steady."""
+    """Whether each row and the rows of the last `SETTLED` seconds before it are steady."""
     before, after = np.clip(time - 0.5, time[0], time[-1]), np.clip(time + 0.5, time[0], time[-1])
     rate = np.abs(np.interp(after, time, a_y) - np.interp(before, time, a_y)) / np.where(
         after > before, after - before, 1.0
@@ -96,18 +101,18 @@ def _is_settled(time: np.ndarray, a_y: np.ndarray, steady: float) -> np.ndarray:
 
 
 def understeer(turns: SteadyTurns, *, above: float = 0.2, linear: float = LINEAR_A_Y) -> Understeer:
-    """The gradients of ISO 4138 in the linear range, by least squares over rows with `above` <= |a_y| <= `linear` (m/s^2).
+    """Return the gradients of ISO 4138 in the linear range, by least squares over rows with `above` <= |a_y| <= `linear` (m/s^2).
 
-    **Raises** `InputError` without a wheelbase, or with too few rows in the range.
+    **Raises** `InputError` if there is no wheelbase, or there are too few rows in the range.
     """
     if turns.geometric_steer is None:
-        raise InputError("understeer: the geometric steer is not known; give `steady_turns` the car's wheelbase (m).")
+        raise InputError("understeer: the geometric steer is unknown; give `steady_turns` the car's wheelbase (m).")
     size = np.abs(turns.a_y)
     rows = (size >= above) & (size <= linear)
     if rows.sum() < FEWEST or np.ptp(turns.a_y[rows]) < 0.1 * linear:
         raise InputError(
             f"understeer: {int(rows.sum())} rows with |a_y| between {above:g} and {linear:g} m/s^2, over too small a range; "
-            "the drive must go through it slowly (ramp-steer, steady-circle)."
+            "the drive must cross the range slowly (ramp-steer, steady-circle)."
         )
     slope = lambda values: float(np.polyfit(turns.a_y[rows], values[rows], 1)[0])
     return Understeer(slope(turns.steer - turns.geometric_steer), slope(turns.sideslip), int(rows.sum()))

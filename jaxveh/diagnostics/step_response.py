@@ -11,15 +11,15 @@ from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.drive_channels import channel, check_gaps, crossing, peak, seconds
 
 RESPONSE_SHARE = 0.9
-"""Share of the steady value at which the response time is taken."""
+"""Share of the steady value that defines the response time."""
 
 
 class StepResponse(NamedTuple):
-    """How one quantity answers a step of the steering (ISO 7401, step input). Times in s from the `reference`.
+    """The response of one quantity to a step of the steering (ISO 7401, step input). Times in s from the `reference`.
 
-    `reference`: the instant (s, the recording's time) when half of the steer is turned. `steer`: the step's height (rad).
+    `reference`: the instant (s, the recording's time) at half of the step. `steer`: the step's height (rad).
     `steady`: the steady value, `gain` = steady / steer. `response_time`: to `RESPONSE_SHARE` of the steady value. `peak`,
-    `peak_response_time`, `overshoot` = peak / steady - 1; where the response creeps up without a peak, NaN, NaN and 0.
+    `peak_response_time`, `overshoot` = peak / steady - 1; for a response without a peak these are NaN, NaN and 0.
     """
 
     reference: float
@@ -33,13 +33,13 @@ class StepResponse(NamedTuple):
 
 
 def step_response(recording: Recording, output: str = "yaw_rate", *, average: float = 0.5) -> StepResponse:
-    """The numbers of ISO 7401 of one `output` in a drive whose `steer` is a step.
+    """Return the numbers of ISO 7401 of one `output` in a drive whose `steer` is a step.
 
-    The steady value is the mean over the last `average` seconds, values before the step are those of the first row. All
-    are of what the recording says: filter a noisy log first. `sensors.low_pass` is causal, and so makes late what it filters:
-    times are right only where `steer` is filtered alike.
+    The steady value is the mean over the last `average` seconds; the values before the step are those of the first row. The
+    recording is not filtered: filter a noisy log first. `sensors.low_pass` is causal and delays the filtered channel: times are
+    right only if `steer` is filtered in the same way.
 
-    **Raises** `InputError` where a channel is missing or has a gap of more than `LONGEST_GAP` (0.5 s), there is no step, or
+    **Raises** `InputError` if a channel is missing or has a gap of more than `LONGEST_GAP` (0.5 s), there is no step, or
     the averaging begins before the steer is held.
     """
     check_positive("average", average, "s")
@@ -52,12 +52,12 @@ def step_response(recording: Recording, output: str = "yaw_rate", *, average: fl
     reach = float(np.max(np.abs(steer)))
     if not reach > 0 or np.ptp(steer[last]) > 0.05 * reach or abs(height) < 0.5 * reach:
         raise InputError(
-            f"step_response: the steer is no step that is held over the last {average:g} s; it ends at {height:g} rad and "
-            f"reaches {reach:g} rad. A longer drive, or a shorter `average`, may do."
+            f"step_response: the steer is not a step that is held over the last {average:g} s; it ends at {height:g} rad and "
+            f"reaches {reach:g} rad. Try a longer drive, or a shorter `average`."
         )
     reference = crossing(time, steer / height, 0.5)
     if steady == 0:
-        raise InputError(f"step_response: {output} does not answer the steer at all.")
+        raise InputError(f"step_response: {output} does not respond to the steer.")
     risen = values / steady
     when, top = peak(time, np.where(time >= reference, risen, -np.inf))
     peaks = top > 1 and when < time[last][0]

@@ -1,4 +1,4 @@
-"""Whether innovations are white: what a filter could still have predicted shows as correlation between rows."""
+"""The whiteness of innovations: correlation between rows is a part that the filter could have predicted."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from jaxveh.diagnostics.innovations import whitened_innovations
 
 
 class Whiteness(NamedTuple):
-    """Correlations of innovations from row to row, and the test that all are zero.
+    """Correlations of innovations between rows, and the test that all are zero.
 
-    `channels`: their names (m,); `lags` (L,) in rows; `correlations` (L, m, m): of channel i with channel j so many rows later;
-    `band` (L, m, m): what each stays within, on either side of zero, with probability `confidence` if the innovations are white;
-    NaN both where no pair of rows has both. `statistic`: chi-squared with `degrees_of_freedom` if they are; `p_value`: the
-    probability of at least as much.
+    `channels`: their names (m,); `lags` (L,) in rows; `correlations` (L, m, m): of channel i with channel j a lag of rows later;
+    `band` (L, m, m): the bound of each on either side of zero, which holds with probability `confidence` for white innovations.
+    Both are NaN if no pair of rows has both channels. `statistic`: chi-squared with `degrees_of_freedom` for white innovations;
+    `p_value`: the probability of at least that value.
     """
 
     channels: tuple[str, ...]
@@ -37,27 +37,28 @@ class Whiteness(NamedTuple):
 
     @property
     def share_inside(self) -> float:
-        """The share of correlations within their bands: about `confidence` is expected."""
+        """The share of correlations within their bands; the expected share is about `confidence`."""
         known = np.isfinite(self.correlations)
         return float(np.mean(np.abs(self.correlations[known]) <= self.band[known]))
 
 
 def whiteness(estimate: Any, lags: int = 20, confidence: float = 0.95, skip: int = 0) -> Whiteness:
-    """The portmanteau test of a filter's innovations, and their correlations with bands.
+    """Return the portmanteau test of a filter's innovations, and their correlations with bands.
 
-    **Arguments**: `estimate`: whatever has an `info` with (T,) leaves, or (R, T) for independent runs; `lags` in rows, at least
-    1; `skip`: rows left out at the start.
+    **Arguments**: `estimate`: any object with an `info` with (T,) leaves, or (R, T) for independent runs; `lags` in rows, at
+    least 1; `skip`: rows left out at the start.
 
-    With innovations w over their predicted spread, and n_l(i, j) pairs of rows l apart that have channel i and then j,
+    With innovations w over their predicted standard deviations, and n_l(i, j) pairs of rows l apart that have channel i in the
+    first row and j in the second,
 
         r_l(i, j) = sum w_i(k) w_j(k + l) / n_l / (s_i s_j),    s_i^2 = mean of w_i^2
         statistic = (N + 2) / N * sum n_l r_l^2,    N rows
 
     (G. Ljung & G. Box 1978; J. Hosking 1980 for several channels; D. Stoffer & C. Toloi 1992 for missing rows; the band
     1 / sqrt(n_l) as in Bar-Shalom, Li & Kirubarajan 2001, sec. 5.4.2). Means are not subtracted: innovations with a bias are not
-    white. Covariances that are all wrong by one factor leave the gain, and so whiteness, as they are: `nis` finds those.
+    white. A common wrong factor in all covariances changes neither the gain nor the whiteness: `nis` detects that.
 
-    **Raises** `InputError` for bad lags, or where the innovations cannot be normalised.
+    **Raises** `InputError` for lags out of range, or if the innovations cannot be normalised.
     """
     check("confidence", confidence, lambda p: (p > 0) & (p < 1), "above 0 and below 1")
     white, here = whitened_innovations(estimate.info, skip)
@@ -91,5 +92,5 @@ def whiteness(estimate: Any, lags: int = 20, confidence: float = 0.95, skip: int
 
 
 def _products(values: np.ndarray, lag: int) -> np.ndarray:
-    """(m, m) sums over runs and rows of channel i times channel j `lag` rows later."""
+    """Return sums (m, m) over runs and rows of channel i times channel j `lag` rows later."""
     return np.einsum("rti,rtj->ij", values[:, :-lag], values[:, lag:])

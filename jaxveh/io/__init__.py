@@ -1,7 +1,7 @@
-"""Recordings in and out (CSV, Parquet, MDF4; MCAP; in from MATLAB), channel maps, data frames, the files that describe a car and
-a road, tyre property files, CommonRoad's vehicle files, and tables of tyre test rigs (CSV, TYDEX, FSAE TTC).
+"""Files: recordings (CSV, Parquet, MDF4, NetCDF, MCAP; MATLAB for reading), channel maps, data frames, car files, road files,
+tyre property files, CommonRoad's vehicle files, and tables of tyre test rigs (CSV, TYDEX, FSAE TTC).
 
-pandas, pyarrow, asammdf, pint, pyyaml, scipy and h5py are the extra `io`, imported where they are used; mcap is the extra `mcap`.
+The extra `io` has pandas, pyarrow, asammdf, pint, pyyaml, scipy and h5py, the extra `mcap` has mcap; each is imported when used.
 """
 
 from jaxveh.io import kit

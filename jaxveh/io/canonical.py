@@ -8,7 +8,7 @@ from jaxveh._core.recording import TRUTH
 
 
 class CanonicalChannel(NamedTuple):
-    """`unit` in which the package uses a channel, and what the channel is."""
+    """The `unit` in which the package uses a channel, and the `meaning` of the channel."""
 
     unit: str
     meaning: str
@@ -26,10 +26,10 @@ CANONICAL: dict[str, CanonicalChannel] = {
         ("sideslip", "rad", "atan2(v_y, v_x)"),
         ("yaw", "rad", "heading, positive to the left, unwrapped"),
         ("course", "rad", "direction of the velocity over ground, positive to the left"),
-        ("heading", "rad", "direction of the car over ground as two antennas tell it, positive to the left"),
+        ("heading", "rad", "direction of the car over ground measured with two antennas, positive to the left"),
         ("climb_rate", "m/s", "vertical speed, positive upwards"),
-        ("lane_offset", "m", "place beside the middle of the lane, positive to the left of it"),
-        ("lane_heading", "rad", "direction of the car against that of the lane, positive to the left"),
+        ("lane_offset", "m", "lateral position relative to the middle of the lane, positive to the left of it"),
+        ("lane_heading", "rad", "direction of the car relative to that of the lane, positive to the left"),
         ("yaw_rate", "rad/s", "positive to the left"),
         ("roll", "rad", "positive when the left side rises"),
         ("roll_rate", "rad/s", "about the x axis"),
@@ -38,12 +38,12 @@ CANONICAL: dict[str, CanonicalChannel] = {
         ("x", "m", "position, ground frame"),
         ("y", "m", "position, ground frame"),
         ("z", "m", "position, ground frame, upward"),
-        ("a_x", "m/s^2", "longitudinal acceleration as an accelerometer shows it"),
-        ("a_y", "m/s^2", "lateral acceleration as an accelerometer shows it, positive to the left"),
-        ("a_z", "m/s^2", "vertical acceleration as an accelerometer shows it"),
+        ("a_x", "m/s^2", "longitudinal acceleration as an accelerometer measures it"),
+        ("a_y", "m/s^2", "lateral acceleration as an accelerometer measures it, positive to the left"),
+        ("a_z", "m/s^2", "vertical acceleration as an accelerometer measures it"),
         ("steer", "rad", "mean angle of the front road wheels, positive to the left"),
         ("steer_rear", "rad", "mean angle of the rear road wheels, positive to the left"),
-        ("steer_left", "rad", "the same as steer_fl, as logs of cars that steer the front wheels alone call it"),
+        ("steer_left", "rad", "the same as steer_fl, the name in logs of cars with front steering"),
         ("steer_right", "rad", "the same as steer_fr"),
         *[(f"steer_{at}", "rad", f"angle of the {wheel} road wheel, positive to the left") for at, wheel in WHEELS],
         ("steering_wheel", "rad", "angle of the steering wheel, positive to the left"),
@@ -66,11 +66,11 @@ CANONICAL: dict[str, CanonicalChannel] = {
         ("F_yr", "N", "lateral force of the rear axle, wheel axes"),
     )
 }
-"""Name to unit and meaning. Other names are allowed everywhere; they keep the unit of their file."""
+"""The known channels, name to unit and meaning. Other names are allowed everywhere; they keep the unit of their file."""
 
 
 def canonical_unit(name: str) -> str | None:
-    """The SI unit of a channel, of a simulation's `true.` channel or of `<channel>_std`; None for an unknown name."""
+    """Return the SI unit of a channel, of a simulation's `true.` channel or of `<channel>_std`; None for an unknown name."""
     plain = name.removeprefix(TRUTH)
     found = CANONICAL.get(plain) or CANONICAL.get(plain.removesuffix("_std"))
     return found.unit if found else None

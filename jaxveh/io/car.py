@@ -1,4 +1,4 @@
-"""One file that describes a car: TOML in SI units, checked key by key."""
+"""The file that describes a car: TOML in SI units, checked key by key."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ mass = 1500.0                        # kg
 yaw_inertia = 2500.0                 # kg m^2, about the vertical axis through the centre of gravity
 front_axle_to_cg = 1.2               # m
 rear_axle_to_cg = 1.5                # m
-front_cornering_stiffness = 90000.0  # N/rad, both wheels of the axle; may be left out where [front] is given
-rear_cornering_stiffness = 110000.0  # N/rad, both wheels of the axle; may be left out where [rear] is given
+front_cornering_stiffness = 90000.0  # N/rad, both wheels of the axle; may be omitted if [front] is given
+rear_cornering_stiffness = 110000.0  # N/rad, both wheels of the axle; may be omitted if [rear] is given
 
 # All that follows is optional.
 name = "passenger car"
@@ -30,37 +30,37 @@ cg_height = 0.55                     # m above ground
 track_front = 1.55                   # m
 track_rear = 1.56                    # m
 steering_ratio = 15.0                # steering wheel angle over road wheel angle
-steer_offset = 0.002                 # rad: what the steer channel shows (at the road wheels) when the car runs straight
-steering = "front"                   # or "ackermann", "rear", "four-wheel", "independent": which wheels turn
-rear_steer_ratio = 0.0               # rear over front angle of "four-wheel", at standstill where the next is given
+steer_offset = 0.002                 # rad: value of the steer channel (at the road wheels) when the car runs straight
+steering = "front"                   # or "ackermann", "rear", "four-wheel", "independent": which wheels are steered
+rear_steer_ratio = 0.0               # rear over front angle of "four-wheel"; at standstill if the next key is given
 rear_steer_ratio_fast = 0.0          # rear over front angle at high speed
-rear_steer_speed = 20.0              # m/s: at this speed the ratio is halfway between both
+rear_steer_speed = 20.0              # m/s: speed at which the ratio is halfway between the two
 sensor_position = [0.1, 0.0, 0.3]    # m from the centre of gravity: forward, left, up
-reference_position = [0.0, 0.0, 0.0] # m from the centre of gravity: where a reference's v_y or sideslip is measured
+reference_position = [0.0, 0.0, 0.0] # m from the centre of gravity: where the reference v_y or sideslip is measured
 low_pass = 20.0                      # Hz, cutoff of the low-pass in the accelerometers and the gyroscope
-wheel_radius = 0.32                  # m; this and the following are of cars on four wheels
+wheel_radius = 0.32                  # m; this key and the following ones are for models with four wheels
 wheel_inertia = 1.2                  # kg m^2, of one wheel about its axle
 drag = 0.4                           # N s^2/m^2: half the air's density times c_d times the area
 rolling_resistance = 0.01            # force over load
 front_drive = 1.0                    # the front axle's share of the driving torque
 front_brake = 0.65                   # the front axle's share of the braking torque
 brake_torque_per_pressure = 1.6e-3   # N m/Pa: braking torque of all wheels together over the line pressure
-antenna_position = [-0.5, 0.0, 0.9]  # m from the centre of gravity: of the satellites' antenna
-satellite_delay = 0.15               # s by which speed and course of satellites are late
-inertial_delay = 0.01                # s by which accelerometers and gyroscope are late beside their low-pass
-camera_delay = 0.08                  # s by which a camera's lane is late
-roll_gradient = 0.006                # rad/(m/s^2): how far the body rolls over the road for a lateral acceleration
-roll_frequency = 1.6                 # Hz, of the body that rolls on its springs, undamped
-roll_damping = 0.3                   # damping ratio of that roll
-pitch_gradient = 0.004               # rad/(m/s^2): how far the nose rises over the road for a longitudinal acceleration
-# front_tyre = "tyres/front.tir"     # the tyre property file of a front wheel, from this file's folder
+antenna_position = [-0.5, 0.0, 0.9]  # m from the centre of gravity: position of the satellite antenna
+satellite_delay = 0.15               # s, delay of speed and course from satellites
+inertial_delay = 0.01                # s, delay of accelerometers and gyroscope in addition to their low-pass
+camera_delay = 0.08                  # s, delay of the lane from a camera
+roll_gradient = 0.006                # rad/(m/s^2): roll of the body relative to the road per lateral acceleration
+roll_frequency = 1.6                 # Hz, undamped natural frequency of the body in roll
+roll_damping = 0.3                   # damping ratio of the body in roll
+pitch_gradient = 0.004               # rad/(m/s^2): rise of the nose relative to the road per longitudinal acceleration
+# front_tyre = "tyres/front.tir"     # tyre property file of a front wheel, relative to the folder of this file
 # rear_tyre = "tyres/rear.tir"
 
 # The Magic Formula of an axle, F_y = D sin(C atan(B a - E (B a - atan(B a)))) + S_v with a = slip angle + S_h.
 [front]
 B = 10.0                             # 1/rad
 C = 1.3
-D = 8000.0                           # N, both wheels of the axle; times load / nominal_load where that is given
+D = 8000.0                           # N, both wheels of the axle; times load / nominal_load if nominal_load is given
 E = 0.2
 S_h = 0.0                            # rad, optional
 S_v = 0.0                            # N, optional
@@ -72,12 +72,15 @@ C = 1.3
 D = 6600.0
 E = 0.2
 """
-"""The file's schema as a commented example that reads, for programs to print."""
+"""The file's schema as a commented, valid example, for programs to print."""
 
 
 STEERINGS = ("front", "ackermann", "rear", "four-wheel", "independent")
-"""What may steer: the front wheels (alike, or about one point); a rear axle with an angle of its own; rear wheels by a ratio
-of the front ones; each wheel by itself."""
+"""The kinds of steering, by the steered wheels.
+
+The front wheels (equal angles, or about one point); also a rear axle with its own angle; the rear wheels by a ratio of the front
+angle; each wheel by itself.
+"""
 
 PLACES = ("sensor_position", "reference_position", "antenna_position")
 """Keys whose values are [x, y, z]."""
@@ -110,19 +113,19 @@ class AxleTyre:
 
 @dataclass(frozen=True, repr=False)
 class CarSpecification(CarTable):
-    """What a car file says: plain floats in SI units, None where the file is silent. See `car.CAR_SCHEMA`.
+    """The contents of a car file: floats in SI units, None for values that the file does not give. See `car.CAR_SCHEMA`.
 
-    Cornering stiffnesses are of the axle, N/rad; one that is left out beside tyre coefficients becomes their B C D.
-    `steer_offset`: what a steer channel at the road wheels shows when the car runs straight. `steering`: one of
-    `car.STEERINGS`, front wheels where None; the ratios are of rear over front angle (see `vehicles.FourWheelSteering`).
-    `sensor_position`, `reference_position`: x, y, z in metres from the centre of gravity of the accelerometer and of a
-    reference for sideslip. `antenna_position`: likewise of the satellites' antenna; `satellite_delay`, `inertial_delay`,
-    `camera_delay` in seconds: how late these speak, an inertial unit's low-pass left out. `low_pass`: cutoff in hertz, of
-    second order. `roll_gradient`, `pitch_gradient`: of the body over the road, for what an accelerometer in the road's axes
-    shows. `front_tyre`, `rear_tyre`: paths of the tyre property files of a wheel, which nobody opens before a car on four
-    wheels is built.
+    Cornering stiffnesses are per axle, N/rad; a missing one is B C D of the axle's tyre coefficients.
+    `steer_offset`: value of a steer channel at the road wheels when the car runs straight. `steering`: one of
+    `car.STEERINGS`, None for front wheels; the ratios are of rear over front angle (see `vehicles.FourWheelSteering`).
+    `sensor_position`, `reference_position`: x, y, z in metres from the centre of gravity, of the accelerometer and of a
+    reference for sideslip. `antenna_position`: likewise of the satellite antenna; `satellite_delay`, `inertial_delay`,
+    `camera_delay` in seconds: delays of these measurements, without that of an inertial unit's low-pass. `low_pass`: cutoff in
+    hertz, of second order. `roll_gradient`, `pitch_gradient`: of the body relative to the road, per acceleration in the axes of
+    the road. `front_tyre`, `rear_tyre`: paths of the tyre property files of a wheel, which are opened only when a model with
+    four wheels is built.
 
-    **Raises** `InputError` with name, value and allowed range for what no car has, such as a negative mass.
+    **Raises** `InputError` with name, value and allowed range for values that no car has, such as a negative mass.
     """
 
     mass: float = _number(0.1, 1e6, "kg")
@@ -181,17 +184,17 @@ class CarSpecification(CarTable):
                 object.__setattr__(self, key, tyre.B * tyre.C * tyre.D)
 
     def save(self, path: str | os.PathLike, *, overwrite: bool = False) -> None:
-        """Write it as a car's file, TOML; see `write_car`."""
+        """Write it as a car file in TOML; see `write_car`."""
         write_car(self, path, overwrite=overwrite)
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> CarSpecification:
-        """A car's file; see `read_car`."""
+        """Read a car file; see `read_car`."""
         return read_car(path)
 
     @property
     def wheelbase(self) -> float:
-        """Distance of the axles in metres."""
+        """Distance between the axles in metres."""
         return self.front_axle_to_cg + self.rear_axle_to_cg
 
     @property
@@ -200,7 +203,7 @@ class CarSpecification(CarTable):
         return self.steering in (None, "front", "ackermann")
 
     def with_front_steering(self) -> CarSpecification:
-        """The same car, its rear wheels straight if they are steered."""
+        """Return the car with front steering: steered rear wheels become straight."""
         if self.steers_front_alone:
             return self
         return replace(self, steering=None, rear_steer_ratio=None, rear_steer_ratio_fast=None)
@@ -209,15 +212,15 @@ class CarSpecification(CarTable):
 def read_car(path: str | os.PathLike) -> CarSpecification:
     """Read a car from TOML (`car.CAR_SCHEMA`).
 
-    **Raises** `InputError` naming the file and: the line of broken TOML, a key that is missing or unknown (with the
-    near ones), or a value with its allowed range.
+    **Raises** `InputError` naming the file and: the line of broken TOML, a key that is missing or unknown (with
+    similar ones), or a value with its allowed range.
     """
     path = Path(path)
     return car_of_toml(read_toml(path), str(path), path.parent)
 
 
 def car_of_toml(content: Mapping[str, Any], where: str, folder: Path) -> CarSpecification:
-    """The car of a TOML table, files that it names being in `folder`; errors begin with `where` the table stands."""
+    """Return the car of a TOML table; file names in it are relative to `folder`, and errors begin with `where`."""
     check_keys(where, content, [entry.name for entry in fields(CarSpecification)])
     try:
         values = {key: _value(key, value, folder) for key, value in content.items()}
@@ -229,14 +232,14 @@ def car_of_toml(content: Mapping[str, Any], where: str, folder: Path) -> CarSpec
 def write_car(car: CarSpecification, path: str | os.PathLike, *, note: str = "", overwrite: bool = False) -> None:
     """Write a car as TOML that `read_car` reads back bit for bit; `note` becomes comment lines at the top.
 
-    The file appears as a whole or not at all. **Raises** `InputError` where it exists and `overwrite` is False.
+    The file is written completely or not at all. **Raises** `InputError` if it exists and `overwrite` is False.
     """
     lines = [f"# {line}".rstrip() for line in note.splitlines()]
     write_text("\n".join(lines + car_lines(car)) + "\n", path, overwrite)
 
 
 def car_lines(car: CarSpecification, table: str = "") -> list[str]:
-    """The lines of a car in TOML, in a table of this name where one is given."""
+    """Return the lines of a car in TOML, inside a table of this name if one is given."""
     lines = [f"[{table}]"] if table else []
     lines += _lines(car)
     for axle in ("front", "rear"):
@@ -246,7 +249,7 @@ def car_lines(car: CarSpecification, table: str = "") -> list[str]:
 
 
 def _lines(values: Any) -> list[str]:
-    """`key = value  # unit` for each number and string that is there."""
+    """Return `key = value  # unit` for each number and string that is not None."""
     lines = []
     for entry in fields(values):
         value, unit = getattr(values, entry.name), entry.metadata.get("unit")
@@ -278,7 +281,7 @@ def _value(key: str, value: Any, folder: Path) -> Any:
 
 
 def _build(kind: type, values: Mapping[str, Any]) -> Any:
-    """The dataclass; names every required key that is missing at once."""
+    """Make the dataclass; the error lists all missing required keys."""
     missing = [entry.name for entry in fields(kind) if _is_required(entry) and entry.name not in values]
     if missing:
         raise InputError(f"missing key(s): {', '.join(missing)}.")
@@ -290,24 +293,24 @@ def _is_required(entry: Any) -> bool:
 
 
 def _check_steering(car: CarSpecification) -> None:
-    """Raise `InputError` for a steering that is not there, one without its ratio, and for a ratio that would be of no use."""
+    """Raise `InputError` for an unknown steering, a missing ratio, and a ratio that the steering does not use."""
     if car.steering is not None:
         check_one_of("steering", car.steering, STEERINGS)
     if car.steering == "four-wheel":
         if car.rear_steer_ratio is None:
             raise InputError(
-                'rear_steer_ratio is missing: a car of steering = "four-wheel" needs it (rear over front angle).'
+                'rear_steer_ratio is missing: a car with steering = "four-wheel" needs it (rear over front angle).'
             )
         return
     for name in ("rear_steer_ratio", "rear_steer_ratio_fast"):
         if getattr(car, name):
             raise InputError(
-                f'{name} = {getattr(car, name)}: is of steering = "four-wheel" alone; say so, or leave it out.'
+                f'{name} = {getattr(car, name)}: only for steering = "four-wheel"; set that, or leave it out.'
             )
 
 
 def _check_numbers(values: Any) -> None:
-    """Make every number a Python float within its range, which the field's metadata hold."""
+    """Convert every number to a Python float and check its range, which is in the field's metadata."""
     for entry in fields(values):
         value = getattr(values, entry.name)
         if value is None or "low" not in entry.metadata:

@@ -1,4 +1,4 @@
-"""A car's file as a table: key, value, unit."""
+"""A car file as a table: key, value, unit."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from jaxveh._core.shown import Shown
 
 
 class CarTable(Shown):
-    """How a car's file is shown: what it says, with units, places and tyres one number by one."""
+    """Shows a car file as a table of its values with units; positions and tyres are split into single numbers."""
 
     __slots__ = ()
 
     drawn_by = "car"
 
     def _told(self) -> dict[str, tuple[Any, str]]:
-        """Every value that the file says, with its unit, by name."""
+        """Return every value of the file, with its unit, by name."""
         found: dict[str, tuple[Any, str]] = {}
         for one in fields(self):  # type: ignore[arg-type]
             value, unit = getattr(self, one.name), one.metadata.get("unit", "")

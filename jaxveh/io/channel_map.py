@@ -1,4 +1,4 @@
-"""A channel map: which column of a log is which channel, in which unit and with which sign."""
+"""A channel map: the columns of a log for the channels, with units and signs."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from jaxveh.io.toml import check_keys, read_toml, shorten, toml_number, toml_tex
 
 CHANNEL_MAP_SCHEMA = """\
 # A channel map. Everything but `column` is optional.
-time = "Time"               # the time column; or { column = "Time", unit = "ms" }. MDF4 has time of its own.
+time = "Time"               # the time column; or { column = "Time", unit = "ms" }. Not used for MDF4.
 
-[channels.yaw_rate]         # the channel's name here; `jaxveh.io.CANONICAL` lists the known ones with their units
+[channels.yaw_rate]         # the channel's name; `jaxveh.io.CANONICAL` lists the known names with their units
 column = "Gierrate"         # its name in the file
-unit = "deg/s"              # its unit in the file; converted to SI. Without it: the file's own unit, else SI
+unit = "deg/s"              # its unit in the file; converted to SI. Default: the file's own unit, otherwise SI
 sign = -1                   # 1 or -1: axes are x forward, y left, z up; turns to the left are positive
-scale = 1.0                 # what is read is sign * (scale * column + offset), in `unit`
+scale = 1.0                 # the value is sign * (scale * column + offset), in `unit`
 offset = 0.0
-group = 3                   # MDF4 only: which channel group, where several have a column of this name
+group = 3                   # MDF4 only: the channel group, if several have a column of this name
 
 [channels]
 v_x = "Speed"               # short for { column = "Speed" }
 
 [csv]                       # CSV only
-separator = ";"             # without it: whichever of , ; and tab the header line has most of
-decimal = ","               # without it: a point
+separator = ";"             # default: the most frequent of , ; and tab in the header line
+decimal = ","               # default: a point
 """
 """The file's schema as a commented example, for programs to print."""
 
@@ -37,7 +37,7 @@ MOST_GROUPS = 2**31
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel's place in a file: `sign * (scale * column + offset)` is its value in `unit` (None: the file's)."""
+    """The column of a channel in a file: its value is `sign * (scale * column + offset)` in `unit` (None: the file's)."""
 
     column: str
     unit: str | None = None
@@ -54,10 +54,10 @@ class Channel:
 
 @dataclass(frozen=True)
 class ChannelMap:
-    """Which columns of a log to read, by channel name; see `channel_map.CHANNEL_MAP_SCHEMA` for the file.
+    """The columns to read from a log, by channel name; see `channel_map.CHANNEL_MAP_SCHEMA` for the file.
 
     `channels`: name to `Channel` (a string is short for `Channel(column)`); `time`: the time column, None for the usual
-    names; `separator`, `decimal`: of a CSV file; `source`: where the map came from, for messages.
+    names; `separator`, `decimal`: of a CSV file; `source`: the origin of the map, for messages.
     """
 
     channels: Mapping[str, Channel]
@@ -70,7 +70,7 @@ class ChannelMap:
         object.__setattr__(self, "channels", {name: _channel(entry) for name, entry in self.channels.items()})
         object.__setattr__(self, "time", None if self.time is None else _channel(self.time))
         if not self.channels:
-            raise InputError(f"{self.source}: names no channel; add a table [channels.NAME] with its column.")
+            raise InputError(f"{self.source}: has no channel; add a table [channels.NAME] with its column.")
         check_one_of(f"{self.source}: decimal", self.decimal, (".", ","))
         if self.separator is not None and len(self.separator) != 1:
             raise InputError(f"{self.source}: separator = {self.separator!r}: must be one character.")
@@ -79,7 +79,7 @@ class ChannelMap:
 def read_channel_map(path: str | os.PathLike) -> ChannelMap:
     """Read a channel map from TOML (`channel_map.CHANNEL_MAP_SCHEMA`).
 
-    **Raises** `InputError` naming file and line of broken TOML, unknown keys with the near ones, values of a wrong
+    **Raises** `InputError` naming file and line of broken TOML, unknown keys with similar ones, values of a wrong
     kind.
     """
     path = Path(path)

@@ -21,7 +21,7 @@ TYRE_COEFFICIENTS = (
     *("p_cy1", "p_dy1", "p_dy3", "p_ey1", "p_ky1", "p_hy1", "p_hy3", "p_vy1", "p_vy3"),
     *("r_by1", "r_by2", "r_by3", "r_cy1", "r_ey1", "r_hy1", "r_vy1", "r_vy3", "r_vy4", "r_vy5", "r_vy6"),
 )
-"""What a tyre file holds: coefficients of PAC2002."""
+"""The coefficients in a tyre file, those of PAC2002."""
 
 
 def _key(key: str, low: float, high: float, unit: str = "", default: Any = None) -> Any:
@@ -30,14 +30,14 @@ def _key(key: str, low: float, high: float, unit: str = "", default: Any = None)
 
 @dataclass(frozen=True)
 class CommonRoadSpecification:
-    """What CommonRoad's files say of a vehicle, in our words: plain floats in SI units, None where they are silent.
+    """The parameters of a vehicle from CommonRoad's files, with the names of this package: floats in SI units, None if missing.
 
     The keys are explained in M. Althoff & G. Würsching, CommonRoad: Vehicle Models, 2020, tables 6 and 7. `front_axle_to_cg` and
-    `rear_axle_to_cg` are those of the sprung mass. Unsprung masses and the torsion bars' stiffnesses (negative, N m/rad) are
-    those of an axle, springs and dampers those of a wheel. `tyre` holds the coefficients of PAC2002 by their names there
-    (`p_ky1`), or is None.
+    `rear_axle_to_cg` are those of the sprung mass. Unsprung masses and stiffnesses of the torsion bars (negative, N m/rad) are
+    per axle, springs and dampers are per wheel. `tyre` has the coefficients of PAC2002 by their names there (`p_ky1`), or
+    is None.
 
-    **Raises** `InputError` with key, value and allowed range for what no vehicle has.
+    **Raises** `InputError` with key, value and allowed range for values that no vehicle has.
     """
 
     front_axle_to_cg: float = _key("a", 1e-3, 30.0, "m", MISSING)
@@ -114,11 +114,11 @@ class CommonRoadSpecification:
 
 
 def read_commonroad(path: str | os.PathLike, tyre: str | os.PathLike | None = None) -> CommonRoadSpecification:
-    """Read a vehicle file of CommonRoad (`parameters_vehicle2.yaml`) and, where `tyre` names it, a tyre file
+    """Read a vehicle file of CommonRoad (`parameters_vehicle2.yaml`) and, if `tyre` names one, a tyre file
     (`parameters_tire.yaml`).
 
-    **Raises** `InputError` naming the file and: the place of broken YAML, a key that is unknown (with the near ones), missing
-    (`a` and `b` alone are needed) or in both files, or a value with its allowed range.
+    **Raises** `InputError` naming the file and: the place of broken YAML, a key that is unknown (with similar ones), missing
+    (only `a` and `b` are required) or in both files, or a value with its allowed range.
     """
     keys = {entry.metadata["key"]: entry.name for entry in fields(CommonRoadSpecification) if "key" in entry.metadata}
     tyre_keys = {f"tire.{name}" for name in TYRE_COEFFICIENTS}
@@ -129,7 +129,7 @@ def read_commonroad(path: str | os.PathLike, tyre: str | os.PathLike | None = No
             check_known(str(file), "key", key, [*keys, *sorted(tyre_keys)])
             into, name = (coefficients, key[5:]) if key in tyre_keys else (found, keys[key])
             if name in into:
-                raise InputError(f"{file}: {key} is given twice, in {path} too.")
+                raise InputError(f"{file}: {key} is given twice; it is also in {path}.")
             into[name] = value
     missing = [key for key in ("a", "b") if keys[key] not in found]
     if missing:
@@ -152,7 +152,7 @@ def _load(path: Path) -> Mapping:
         ValueError,
         TypeError,
         RecursionError,
-    ) as error:  # dates, numbers and keys that are none, too
+    ) as error:  # invalid dates, numbers and keys, too
         raise InputError(f"{path}: broken YAML: {' '.join(str(error).split())}.") from error
     if not isinstance(content, Mapping):
         raise InputError(f"{path}: must be a mapping of keys to numbers.")
@@ -160,7 +160,7 @@ def _load(path: Path) -> Mapping:
 
 
 def _flat(content: Mapping) -> dict[str, Any]:
-    """`{"steering": {"min": 1}}` as `{"steering.min": 1}`; what is empty is left out."""
+    """Return `{"steering": {"min": 1}}` as `{"steering.min": 1}`; empty values are left out."""
     flat: dict[str, Any] = {}
     for key, value in content.items():
         inner = {f"{key}.{name}": v for name, v in value.items()} if isinstance(value, Mapping) else {str(key): value}
@@ -170,7 +170,7 @@ def _flat(content: Mapping) -> dict[str, Any]:
 
 def _number(name: str, value: Any, low: float, high: float, allowed: str) -> float:
     try:
-        # YAML takes 10.0e3 for a text: its exponents have signs.
+        # YAML reads 10.0e3 as text, because its exponents need signs.
         number = math.nan if isinstance(value, bool) else decimal(value) if isinstance(value, str) else float(value)
     except (TypeError, ValueError, OverflowError):
         number = math.nan

@@ -1,4 +1,4 @@
-"""CSV through pandas: read with the exact decimal value of each cell, written so that reading gives the same floats."""
+"""CSV through pandas: each cell is read as its exact decimal value, and files are written so that they read back the same."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _ENCODING = "utf-8-sig"
 
 
 def open_csv(path: Path, channels: ChannelMap | None) -> TableLog:
-    """A CSV file with one header line; separator and decimal sign as the channel map says.
+    """Open a CSV file with one header line; the channel map gives the separator and the decimal sign.
 
-    Without a map: whichever of `,` `;` and tab the header line has most of, and a decimal point.
+    Without a map the separator is the most frequent of `,`, `;` and tab in the header line, and the decimal sign is a point.
     """
     headings, separator = _header(path, channels.separator if channels else None)
     columns = _columns(path, headings, separator, channels.decimal if channels else ".")
@@ -32,13 +32,13 @@ def open_csv(path: Path, channels: ChannelMap | None) -> TableLog:
 
 
 def read_columns(path: Path) -> dict[str, Any]:
-    """The cells of each column by heading, of a CSV file with one header line that need not have a time column."""
+    """Return the cells of each column, by heading, of a CSV file with one header line; it needs no time column."""
     headings, separator = _header(path, None)
     return _columns(path, headings, separator, ".")
 
 
 def read_below(path: Path, headings: list[str], separator: str, lines: int) -> dict[str, Any]:
-    """The cells of each column by heading, below so many `lines` of a header; what is no UTF-8 stays unreadable text."""
+    """Return the cells of each column, by heading, below `lines` header lines; bytes that are not UTF-8 are replaced."""
     return _columns(path, headings, separator, ".", lines, "replace")
 
 
@@ -46,7 +46,7 @@ def _columns(
     path: Path, headings: list[str], separator: str, decimal: str, lines: int = 1, errors: str = "strict"
 ) -> dict[str, Any]:
     frame = _read(path, headings, separator, decimal, lines, errors)
-    # A separator at the end of every line makes a last column without name and without cells.
+    # A separator at the end of every line makes a last column without a name and without cells.
     if headings[-1] == "" and frame.iloc[:, -1].isna().all():
         headings = headings[:-1]
     return {heading: frame.iloc[:, column].array for column, heading in enumerate(headings)}
@@ -55,20 +55,20 @@ def _columns(
 def write_csv(
     path: Path, time: np.ndarray, columns: Mapping[str, np.ndarray], units: Mapping[str, str], note: str
 ) -> None:
-    """One header line, then every float in the shortest form that reads back as the same float64; NaN is an empty cell.
+    """Write one header line, then every float in the shortest form that reads back as the same float64; NaN is an empty cell.
 
     The format has no place for units and note: they are dropped (see `io.with_units_in_names`). A known channel in
-    another unit than SI would be read back wrongly, so it raises.
+    another unit than SI would be read back wrongly, so it raises `InputError`.
     """
     for name in columns:
         wanted = canonical_unit(name)
         if wanted is not None and is_unit(units.get(name)) and not same_unit(units[name], wanted):
             raise InputError(
-                f"{name} is in {units[name]!r}, not in {wanted!r}, and CSV cannot say so. Convert it first, write "
+                f"{name} is in {units[name]!r}, not in {wanted!r}, and CSV has no place for units. Convert it first, write "
                 "Parquet or MDF4, or put units in the names (io.with_units_in_names)."
             )
     pandas = require("pandas", "writing CSV")
-    # float32 in its own shortest form would read back as another float64.
+    # The shortest form of a float32 would read back as another float64.
     wide = {name: np.asarray(values, dtype=np.float64) for name, values in {"time": time, **columns}.items()}
     pandas.DataFrame(wide).to_csv(path, index=False, lineterminator="\n", encoding="utf-8")
 
@@ -93,7 +93,7 @@ def _header(path: Path, separator: str | None) -> tuple[list[str], str]:
 
 
 def _exact(version: str) -> dict[str, str]:
-    """What makes pandas read each decimal as its nearest float64: the only way since 3.1, an option before."""
+    """Return the option that makes pandas read each decimal as its nearest float64; since 3.1 pandas always does."""
     major, minor = map(int, version.split(".")[:2])
     return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}
 
@@ -102,7 +102,7 @@ def _read(path: Path, headings: list[str], separator: str, decimal: str, lines: 
     pandas = require("pandas", "reading CSV")
     try:
         with warnings.catch_warnings():
-            # Rows longer than the header would lose cells with a warning only.
+            # Without this, rows longer than the header would lose cells with only a warning.
             warnings.simplefilter("error", pandas.errors.ParserWarning)
             return pandas.read_csv(
                 path,

@@ -1,4 +1,4 @@
-"""Results as xarray's datasets and pandas' data frames, and datasets as results."""
+"""Results as datasets of xarray and data frames of pandas, and datasets as results."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from jaxveh._core.version import VERSION
 from jaxveh.io.optional import require
 
 TOLD = "jaxveh"
-"""The attribute with what makes a result of a dataset again."""
+"""The attribute that holds the facts from which a dataset becomes a result again."""
 
 
 def facts_as_text(labelled: Labelled) -> str:
-    """Kind, version and facts as JSON, for a file's attribute."""
+    """Return kind, version and facts as JSON, for a file's attribute."""
     return json.dumps(
         {"kind": labelled.kind, "version": VERSION, "shown": labelled.shown, "facts": labelled.facts}, default=_of_numpy
     )
@@ -30,7 +30,7 @@ def _of_numpy(value: Any) -> Any:
 def arrays_of_text(
     text: Any, variables: dict[str, Variable], coordinates: dict[str, Variable], source: str, what: str
 ) -> Labelled:
-    """What `facts_as_text` was told of, with its arrays. **Raises** `InputError` for a text that is not of ours."""
+    """Return the result of a text of `facts_as_text` with its arrays. **Raises** `InputError` for any other text."""
     try:
         content = json.loads(text)
         return Labelled(content["kind"], variables, coordinates, tuple(content["shown"]), source, content["facts"])
@@ -39,7 +39,7 @@ def arrays_of_text(
 
 
 def dataset_of(labelled: Labelled) -> Any:
-    """An `xarray.Dataset`; a unit is the attribute `units` of its variable, `kind` and `source` are attributes of the whole."""
+    """Return an `xarray.Dataset`; units are attributes `units` of the variables, `kind` and `source` those of the dataset."""
     xarray = require("xarray", "making a dataset")
     array = lambda one: (one.dims, np.asarray(one.values), {"units": one.unit} if one.unit else {})
     return xarray.Dataset(
@@ -50,7 +50,7 @@ def dataset_of(labelled: Labelled) -> Any:
 
 
 def of_dataset(kind: type, dataset: Any) -> Any:
-    """The result of a `kind` that `dataset_of` made a dataset of. **Raises** `InputError` for a dataset of another."""
+    """Return the result of a `kind` from its dataset of `dataset_of`. **Raises** `InputError` for the dataset of another kind."""
     xarray = require("xarray", "reading a dataset")
     if not isinstance(dataset, xarray.Dataset):
         raise InputError(f"{kind.__name__}.from_xarray: {type(dataset).__name__}: must be an xarray.Dataset.")
@@ -58,7 +58,7 @@ def of_dataset(kind: type, dataset: Any) -> Any:
 
 
 def arrays_of_dataset(dataset: Any, what: str) -> Labelled:
-    """A dataset's arrays with its facts; one of strangers is of no kind."""
+    """Return a dataset's arrays with its facts; the kind of a dataset from another program is empty."""
     variable = lambda one: Variable(one.dims, _plain(one.values), str(one.attrs.get("units", "")))
     variables = {str(name): variable(one) for name, one in dataset.data_vars.items()}
     coordinates = {str(name): variable(one) for name, one in dataset.coords.items()}
@@ -69,16 +69,16 @@ def arrays_of_dataset(dataset: Any, what: str) -> Labelled:
 
 
 def _plain(values: np.ndarray) -> np.ndarray:
-    """Words as objects, whatever a library has made of them."""
+    """Return text arrays as arrays of objects, whatever type a library has given them."""
     return values.astype(object) if values.dtype.kind in "UT" else values
 
 
 def result_of(kind: type, labelled: Labelled, what: str) -> Any:
-    """The result of a kind. **Raises** `InputError` where it is another's, or something is missing."""
+    """Return the result of a kind. **Raises** `InputError` if it is of another kind, or something is missing."""
     of_strangers = labelled.kind == "" and kind.__name__ == "Recording"
     if labelled.kind != kind.__name__ and not of_strangers:
-        found = f"one of {labelled.kind}" if labelled.kind else f"a stranger's, without the attribute {TOLD}"
-        raise InputError(f"{what}: must be of {kind.__name__}, and is {found}.")
+        found = f"of {labelled.kind}" if labelled.kind else f"from another program, without the attribute {TOLD}"
+        raise InputError(f"{what}: must be of {kind.__name__}, but is {found}.")
     try:
         return kind._of_labelled(labelled)  # type: ignore[attr-defined]
     except InputError as error:
@@ -88,8 +88,11 @@ def result_of(kind: type, labelled: Labelled, what: str) -> Any:
 
 
 def frame_of(labelled: Labelled) -> Any:
-    """A data frame of what is shown: a row for each place along the dimensions that all of it has, whose coordinates are the
-    first columns. What has more dimensions is taken apart: `name[0]`, or by the coordinate there."""
+    """Return a data frame of the displayed variables, with a row per place along the dimensions that they share.
+
+    Their coordinates are the first columns. A variable with more dimensions becomes several columns, such as `name[0]`, or with
+    the value of the coordinate in the brackets.
+    """
     pandas = require("pandas", "making a data frame")
     shown = {name: labelled.both[name] for name in labelled.shown if name in labelled.both}
     first = next(iter(shown.values())).dims if shown else ()
@@ -115,14 +118,14 @@ def frame_of(labelled: Labelled) -> Any:
 
 
 def _along(one: Variable, dims: tuple[str, ...], shape: tuple[int, ...]) -> np.ndarray:
-    """A variable over all of the dimensions."""
+    """Broadcast a variable over all of the dimensions."""
     order = [d for d in dims if d in one.dims]
     values = np.transpose(np.asarray(one.values), [one.dims.index(d) for d in order])
     return np.broadcast_to(values.reshape([n if d in one.dims else 1 for d, n in zip(dims, shape, strict=True)]), shape)
 
 
 def _apart(name: str, one: Variable, dims: tuple[str, ...], shape: tuple[int, ...], labelled: Labelled):
-    """The columns of a variable: one, or one for each place along the dimensions that the table does not have."""
+    """Yield the columns of a variable: one, or one for each place along the dimensions that the table does not have."""
     more = tuple(d for d in one.dims if d not in dims)
     if not more:
         yield name, _along(one, dims, shape)

@@ -1,4 +1,4 @@
-"""Numbers in text files: what a person would call one, and nothing else that Python takes for one."""
+"""Numbers in text files: plain decimal numbers, and none of the other forms that Python accepts."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ _DECIMAL = re.compile(r"\s*[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?
 
 
 def decimal(text: str) -> float:
-    """The finite number that a text holds in decimal digits, such as `-1.5` or `2e-3`.
+    """Return the finite number of a text in decimal digits, such as `-1.5` or `2e-3`.
 
-    **Raises** `ValueError` for all else that `float` takes: `nan`, `inf`, `1e400`, `1_000`, digits of other scripts.
+    **Raises** `ValueError` for other texts that `float` accepts: `nan`, `inf`, `1e400`, `1_000`, digits of other scripts.
     """
     number = float(text) if _DECIMAL.fullmatch(text) else math.nan
     if not math.isfinite(number):
-        raise ValueError(f"{text!r} is no finite decimal number")
+        raise ValueError(f"{text!r} is not a finite decimal number")
     return number
 
 
 def is_number(text: str) -> bool:
-    """Whether Python takes a text for a number, `nan` and `inf` included: data, and no heading."""
+    """Whether Python accepts a text as a number, `nan` and `inf` included: it is data and not a heading."""
     try:
         float(text)
     except ValueError:

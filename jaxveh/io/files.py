@@ -1,4 +1,4 @@
-"""Files: clear errors on reading, all or nothing on writing. Nothing else in the package opens a file to write it."""
+"""Files: clear errors when reading, all or nothing when writing. Only this module opens files for writing."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def check_readable(path: Path) -> None:
 
 
 def check_suffix(path: Path, allowed: Iterable[str], kind: str = "file") -> str:
-    """The suffix in small letters; raises `InputError` unless it is one of `allowed`."""
+    """Return the suffix in lower case; raise `InputError` unless it is one of `allowed`."""
     suffix = path.suffix.lower()
     if suffix not in tuple(allowed):
         allowed = tuple(allowed)
@@ -41,13 +41,13 @@ def check_suffix(path: Path, allowed: Iterable[str], kind: str = "file") -> str:
 
 @contextlib.contextmanager
 def replacing_file(path: str | os.PathLike, overwrite: bool = False) -> Iterator[Path]:
-    """Yield a path to write to; it takes the place of `path` in one step when the block ends without an error.
+    """Yield a path to write to; that file replaces `path` in one step when the block ends without an error.
 
-    A failure, an interrupt included, leaves what was there before: never half a file, and nothing beside it. What a program
-    that was killed has left beside `path` goes with the next writing of it. A link stays one: its target is replaced. An
-    interrupt that a library has swallowed on its way is raised at the end.
+    A failure, an interrupt included, leaves the previous file: never half a file, and no other file beside it. Leftovers of a
+    killed program beside `path` are deleted at the next writing of `path`. If `path` is a link, its target is replaced. An
+    interrupt that a library has swallowed is raised at the end.
 
-    **Raises** `InputError` where `path` exists and `overwrite` is False, or the system refuses to write.
+    **Raises** `InputError` if `path` exists and `overwrite` is False, or the system refuses to write.
     """
     path = Path(path)
     if path.is_dir():
@@ -66,9 +66,9 @@ def replacing_file(path: str | os.PathLike, overwrite: bool = False) -> Iterator
 
 @contextlib.contextmanager
 def making_folder(path: str | os.PathLike) -> Iterator[Path]:
-    """Yield a new folder to write into; it becomes `path`, with all that is in it, when the block ends without an error.
+    """Yield a new folder to write into; it becomes `path`, with its contents, when the block ends without an error.
 
-    **Raises** `InputError` where `path` exists, or the system refuses to write.
+    **Raises** `InputError` if `path` exists, or the system refuses to write.
     """
     path = Path(path)
     if path.exists():
@@ -85,7 +85,7 @@ def making_folder(path: str | os.PathLike) -> Iterator[Path]:
 
 
 def write_text(text: str, path: str | os.PathLike, overwrite: bool = False) -> None:
-    """Write a text file in UTF-8, all or nothing."""
+    """Write a text file in UTF-8, completely or not at all."""
     with replacing_file(path, overwrite) as part:
         part.write_text(text, encoding="utf-8", newline="\n")
 
@@ -100,10 +100,10 @@ def _refusals_in_words(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _beside(path: Path) -> Iterator[Path]:
-    """A path of the same name in a hidden folder beside `path`, on the same disk; the folder goes in the end.
+    """Yield a path of the same name in a hidden folder beside `path`, on the same disk; the folder is deleted in the end.
 
-    A folder rather than a file: writers may add files of their own, and the result has the usual permissions. Its name says
-    for what, and which process of which computer writes, so that it is known for a leftover once that process is gone.
+    It is a folder rather than a file because writers may add further files, and because the result then has the usual
+    permissions. Its name contains the target, the computer and the process, so that a leftover of an ended process is recognised.
     """
     mark = f".writing-{zlib.crc32(os.fsencode(path.name)):08x}-{_host()}-"
     for leftover in path.parent.glob(f"{mark}*"):
@@ -117,12 +117,12 @@ def _beside(path: Path) -> Iterator[Path]:
 
 
 def _host() -> str:
-    """This computer's name, of letters and digits; folders may be shared by several."""
+    """Return this computer's name in letters and digits; several computers may share a folder."""
     return re.sub(r"\W", "", socket.gethostname())[:32]
 
 
 def _lives(rest: str) -> bool:
-    """Whether the process whose number begins the rest of a hidden folder's name is there; on Windows nobody can ask safely."""
+    """Whether the process whose number begins the rest of a hidden folder's name still runs; Windows has no safe way to ask."""
     number = rest.partition("-")[0]
     if os.name == "nt" or not number.isdigit():
         return True
@@ -137,10 +137,10 @@ def _lives(rest: str) -> bool:
 
 @contextlib.contextmanager
 def _interrupts_heard() -> Iterator[None]:
-    """Raise `KeyboardInterrupt` at the end of a block in which one came and was lost, as in pandas' writer of CSV, which is C."""
+    """Raise `KeyboardInterrupt` at the end of a block that lost an interrupt, as pandas' CSV writer (written in C) does."""
     usual = signal.getsignal(signal.SIGINT)
     if usual is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
-        yield  # someone else hears them
+        yield  # another handler receives the interrupts
         return
     heard = []
 
@@ -162,6 +162,6 @@ def _interrupts_heard() -> Iterator[None]:
 
 
 def _settle(path: Path) -> None:
-    """Have the system put a file's content on the disk before its name points to it."""
+    """Have the system write a file's content to the disk before its name points to it."""
     with path.open("rb+") as file:
         os.fsync(file.fileno())

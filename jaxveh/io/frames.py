@@ -19,9 +19,9 @@ from jaxveh.io.units import convert, is_unit
 
 
 def to_frame(data: Any) -> Any:
-    """A `pandas.DataFrame` with a column `time` and one a channel, T rows.
+    """Return a `pandas.DataFrame` with a column `time` and one per channel, T rows.
 
-    `data`: a `Recording`, or anything with `time` (T,), `mean` and `std` (NamedTuples or mappings of (T,)), as an
+    `data`: a `Recording`, or anything with `time` (T,), `mean` and `std` (NamedTuples or mappings of (T,)), such as an
     estimate of `jaxveh.run`: then columns are `name` and `name_std`, a standard deviation beside each mean. Units are
     in `frame.attrs["units"]`, a recording's note in `frame.attrs["source"]`.
 
@@ -44,14 +44,14 @@ def to_frame(data: Any) -> Any:
 
 
 def from_frame(frame: Any) -> Recording:
-    """The recording that `to_frame` made a data frame of, or a stranger's frame: a channel a column, of its float type (others
-    become floats), in half precision at the least.
+    """Return the recording of a data frame of `to_frame`, or of any other frame: each column is a channel.
 
-    Time is the column `time`, else the index: numbers are seconds, a `pandas.TimedeltaIndex` too, a `pandas.DatetimeIndex` counts
-    from 1970. Units and note are those of `frame.attrs`; `name [unit]` as a column's name says its unit, and what `io.CANONICAL`
-    has is converted then.
+    A channel has the float type of its column, in half precision at the least; other types become floats. Time is the column
+    `time`, otherwise the index: numbers are seconds, a `pandas.TimedeltaIndex` becomes seconds, a `pandas.DatetimeIndex` seconds
+    since 1970. Units and note are those of `frame.attrs`; a column's name may be `name [unit]`, and a channel of `io.CANONICAL`
+    is then converted to SI.
 
-    **Raises** `InputError` for columns that are not numbers, names that are there twice, and time that does not increase.
+    **Raises** `InputError` for columns that are not numbers, duplicate names, and time that does not increase.
     """
     pandas = require("pandas", "reading a data frame")
     if not isinstance(frame, pandas.DataFrame):
@@ -81,18 +81,18 @@ def from_frame(frame: Any) -> Recording:
 
 
 def _index(index: Any) -> np.ndarray:
-    """Seconds of a frame's index."""
+    """Return a frame's index in seconds."""
     if getattr(index, "tz", None) is not None:
         index = index.tz_convert(None)
     if index.dtype.kind in "mM":
         return index.to_numpy().astype(f"{index.dtype.kind}8[ns]").astype(np.int64) / 1e9
-    return numeric(index.to_numpy(), "from_frame: the index, as there is no column `time`")
+    return numeric(index.to_numpy(), "from_frame: the index, because there is no column `time`")
 
 
 def write_frame(frame: Any, path: str | os.PathLike, *, overwrite: bool = False) -> None:
-    """Write a data frame with a column `time` as `.csv`, `.parquet`, `.nc`, `.mf4` or `.mdf`, as `write_recording` does.
+    """Write a data frame with a column `time` as `.csv`, `.parquet`, `.nc`, `.mf4` or `.mdf`, like `write_recording`.
 
-    Units and note are those of `frame.attrs`, as `to_frame` sets them. **Raises** `InputError` as `write_recording`,
+    Units and note are those of `frame.attrs`, as `to_frame` sets them. **Raises** `InputError` like `write_recording`,
     and for a frame without `time` or with columns that are not numbers.
     """
     if "time" not in frame.columns:

@@ -1,4 +1,4 @@
-"""What those who read and write further files build with."""
+"""Tools to read and write further kinds of files."""
 
 from jaxveh.io.car import CAR_SCHEMA, STEERINGS, car_lines, car_of_toml
 from jaxveh.io.channel_map import CHANNEL_MAP_SCHEMA

@@ -1,4 +1,4 @@
-"""What the readers share: a log is a set of columns, each with its own time stamps and perhaps a unit."""
+"""The common base of the readers: a log is a set of columns, each with its own time stamps and possibly a unit."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from jaxveh.io.toml import shorten
 from jaxveh.io.units import convert, is_unit
 
 TIME_NAMES = ("time", "timestamps", "timestamp", "t")
-"""Names under which a time column is looked for, in this order, capitals or not."""
+"""Names by which a time column is found, in this order and in any case."""
 
 # `wheel[3]` is a name, `speed [km/h]` is a name and a unit.
 _UNIT_IN_NAME = re.compile(r"^(?P<name>.*\S)\s*\[(?!\d+\])(?P<unit>[^\[\]]*)\]$")
 
 
 class Column(NamedTuple):
-    """One column of a log: `time` (n,) in seconds, `values` (n,), `unit` ("" where the file names none)."""
+    """One column of a log: `time` (n,) in seconds, `values` (n,), `unit` ("" if the file names none)."""
 
     time: np.ndarray
     values: np.ndarray
@@ -33,27 +33,27 @@ class Column(NamedTuple):
 
 
 class Log(abc.ABC):
-    """An open log: `path`, `note` (what the file says of its source, or ""), `names` of its columns without time."""
+    """An open log: `path`, `note` (the file's note about its source, or ""), `names` of its columns without time."""
 
     path: Path
     note: str
     names: tuple[str, ...]
     as_saved: bool = False
-    """Whether the file is a recording's own, whose channels have the float types that they had."""
+    """Whether the file was saved from a recording, so that its channels keep their float types."""
 
     @abc.abstractmethod
     def column(self, name: str, group: int | None = None) -> Column:
-        """Load one column; raises `InputError` for a name that is not there or cells that are not numbers."""
+        """Load one column; raise `InputError` for an unknown name, or cells that are not numbers."""
 
-    def close(self) -> None:  # noqa: B027  most logs hold nothing open
-        """Give the file back."""
+    def close(self) -> None:  # noqa: B027  most logs keep no file open
+        """Close the file."""
 
 
 class TableLog(Log):
     """A log whose columns share one time column: CSV and Parquet.
 
-    `cells` are the columns' names with the function that loads their cells; a name may carry its unit in brackets
-    (`yaw_rate [deg/s]`) unless `units` knows it.
+    `headings` are the names of the columns, `load` returns the cells of one; a name may have its unit in brackets
+    (`yaw_rate [deg/s]`), unless `units` has it.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class TableLog(Log):
         return Column(self._time, self._values(name), self._units[name])
 
     def _plain(self, name: str) -> str:
-        """The name without unit of a column that is asked for with or without it."""
+        """Return the name without unit of a column that may be given with its unit."""
         if name not in self._heading and name in self._heading.values():
             name = split_unit(name)[0]
         check_known(str(self.path), "column", name, self._heading, "Name the file's column in the channel map.")
@@ -114,25 +114,27 @@ def split_unit(heading: str) -> tuple[str, str]:
 
 
 def apply(channel: Channel, values: np.ndarray) -> np.ndarray:
-    """A channel map's sign, scale and offset; values (n,) stay untouched where the map asks for nothing."""
+    """Apply a channel map's sign, scale and offset to values (n,), which are unchanged with the default ones."""
     if channel.scale != 1.0 or channel.offset != 0.0:
         values = channel.scale * values + channel.offset
     return -values if channel.sign < 0 else values
 
 
 def numeric(cells, what: str) -> np.ndarray:
-    """Cells as a float array (n,), empty ones as NaN; the error names the first row whose cell is not a number."""
+    """Return cells as a float array (n,), empty ones as NaN; the error names the first row whose cell is not a number."""
     array = np.asarray(cells)
     if array.ndim == 1 and array.dtype.name == "bfloat16":
         return array
     if array.ndim != 1 or array.dtype.kind in "cV":
-        raise InputError(f"{what}: holds {array.dtype} of shape {array.shape}, not one number a row. Leave it out.")
+        raise InputError(
+            f"{what}: contains {array.dtype} of shape {array.shape}, not one number per row. Leave it out."
+        )
     if array.dtype.kind == "f":
         return array
     if array.dtype.kind in "iub":
         return array.astype(np.float64)
     if array.dtype.kind in "mM":
-        raise InputError(f"{what}: holds dates, not numbers. Convert it to seconds first, or leave it out.")
+        raise InputError(f"{what}: contains dates, not numbers. Convert it to seconds first, or leave it out.")
     return np.array([_cell(cell, row, what) for row, cell in enumerate(array.tolist())], dtype=np.float64)
 
 

@@ -1,7 +1,6 @@
-"""MATLAB files of version 5 (`save` with -v6 and -v7) as their tagged elements, each checked against the file's end.
+"""Reading of MATLAB files of version 5 (`save` with -v6 and -v7) by their tagged elements, each checked against the file's end.
 
-Source: MAT-File Format, MathWorks R2024a, chapter 1. SciPy reads the same, and ends the process
-where a tag is damaged.
+Source: MAT-File Format, MathWorks R2024a, chapter 1. SciPy reads these files too, but ends the process if a tag is damaged.
 """
 
 from __future__ import annotations
@@ -24,25 +23,25 @@ NUMBERS = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13:
 COMPLEX, LOGICAL = 0x0800, 0x0200
 
 DEEPEST = 24
-"""Structs in structs: a damaged file may hold itself."""
+"""Deepest nesting of structs: a damaged file may contain itself."""
 LARGEST = 2**32
-"""Bytes of an element when it is no longer compressed."""
+"""Largest size of an element after decompression, bytes."""
 
 
 class Unread(NamedTuple):
-    """Stands for what cannot be read: an object of a MATLAB class, a table, a function."""
+    """Stands for a value that cannot be read: an object of a MATLAB class, a table, a function."""
 
     what: str
 
 
 def variables_of(data: bytes) -> Iterator[tuple[str, Any]]:
-    """Name and value of each variable of a file: arrays, dicts (structs), lists (cells and arrays of structs), `str`, `Unread`.
+    """Yield name and value of each variable: arrays, dicts (structs), lists (cells and arrays of structs), `str`, `Unread`.
 
-    **Raises** `InputError` where an element does not fit into the file.
+    **Raises** `InputError` if an element does not fit into the file.
     """
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if order is None:
-        raise InputError("it begins neither as version 5 nor as 7.3; save it anew with -v7")
+        raise InputError("it begins neither as version 5 nor as 7.3; save it again with -v7")
     reader = _Elements(data, HEADER, len(data), order)
     while reader.left():
         kind, inside = reader.next()
@@ -50,7 +49,7 @@ def variables_of(data: bytes) -> Iterator[tuple[str, Any]]:
             kind, inside = _unpack(inside).next()
         if kind == MATRIX:
             name, value = _matrix(inside, 0)
-            # What has no name is MATLAB's own: the numbers of its objects.
+            # Elements without a name are internal to MATLAB: the data of its objects.
             if name:
                 yield name, value
 
@@ -64,7 +63,7 @@ def _unpack(packed: _Elements) -> _Elements:
 
 
 class _Elements:
-    """The elements between two places of the data, one after the other."""
+    """The elements between two positions in the data, one after the other."""
 
     def __init__(self, data: bytes, at: int, end: int, order: str):
         self.data, self.at, self.end, self.order = data, at, end, order
@@ -76,13 +75,13 @@ class _Elements:
         return self.data[self.at : self.end]
 
     def next(self) -> tuple[int, _Elements]:
-        """The kind of the next element, and what is inside of it."""
+        """Return the kind and the contents of the next element."""
         if self.end - self.at < 8:
             raise InputError(f"it ends within an element, at byte {self.at}")
         kind, size = struct.unpack_from(f"{self.order}II", self.data, self.at)
         start, length = self.at + 8, size
         if kind >> 16:
-            # Up to four bytes stand in the tag itself.
+            # Up to four bytes are in the tag itself.
             kind, size, start, length = kind & 0xFFFF, kind >> 16, self.at + 4, 4
         elif kind != COMPRESSED:
             length = -(-size // 8) * 8
@@ -92,10 +91,10 @@ class _Elements:
         return kind, _Elements(self.data, start, start + size, self.order)
 
     def array(self) -> np.ndarray:
-        """The numbers of the next element, (n,)."""
+        """Return the numbers of the next element, (n,)."""
         kind, inside = self.next()
         if kind not in STORED:
-            raise InputError(f"an element of type {kind} holds no numbers")
+            raise InputError(f"an element of type {kind} has no numbers")
         dtype = np.dtype(inside.order + STORED[kind])
         raw = inside.rest()
         if len(raw) % dtype.itemsize:
@@ -103,7 +102,7 @@ class _Elements:
         return np.frombuffer(raw, dtype).astype(dtype.newbyteorder("="))
 
     def text(self) -> str:
-        """The text of the next element."""
+        """Return the text of the next element."""
         kind, inside = self.next()
         if kind in TEXTS:
             suffix = "" if kind == 16 else {"<": "-le", ">": "-be"}[inside.order]
@@ -114,9 +113,9 @@ class _Elements:
 
 
 def _matrix(inside: _Elements, depth: int) -> tuple[str, Any]:
-    """Name and value of a variable, a cell or a field."""
+    """Return name and value of a variable, a cell or a field."""
     if depth > DEEPEST:
-        raise InputError(f"structs lie deeper than {DEEPEST} in each other")
+        raise InputError(f"structs are nested more than {DEEPEST} levels deep")
     if not inside.left():
         return "", np.zeros((0, 0))
     flags = int(inside.array()[:1].sum())
@@ -146,12 +145,12 @@ def _matrix(inside: _Elements, depth: int) -> tuple[str, Any]:
 def _field(inside: _Elements, depth: int) -> Any:
     kind, element = inside.next()
     if kind != MATRIX:
-        raise InputError(f"an element of type {kind} stands where a matrix should")
+        raise InputError(f"an element of type {kind} is in the place of a matrix")
     return _matrix(element, depth + 1)[1]
 
 
 def _structs(inside: _Elements, name: str, count: int, depth: int) -> Any:
-    """A struct as a dict; several in an array as the list of them."""
+    """Return a struct as a dict, and an array of structs as a list of dicts."""
     length = int(inside.array()[:1].sum())
     _, element = inside.next()
     raw = element.rest()

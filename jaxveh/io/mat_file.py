@@ -1,4 +1,4 @@
-"""What a MATLAB file holds, of version 5 or 7.3 (HDF5, through h5py), as nested dicts, lists, strings and arrays."""
+"""The contents of a MATLAB file, of version 5 or 7.3 (HDF5, through h5py), as nested dicts, lists, strings and arrays."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ HIDDEN = ("#refs#", "#subsystem#")
 
 
 def read_mat(path: Path) -> dict[str, Any]:
-    """The variables of a `.mat` file by name. Arrays have MATLAB's shapes; structs are dicts, cells and arrays of structs are
-    lists, text is `str`; what only MATLAB can read is `Unread`.
+    """Read the variables of a `.mat` file by name.
 
-    **Raises** `InputError` for a file that is no MATLAB file, or a damaged one.
+    Arrays have MATLAB's shapes; structs are dicts, cells and arrays of structs are lists, text is `str`; values that only MATLAB
+    can read are `Unread`.
+
+    **Raises** `InputError` for a file that is not a MATLAB file, or is damaged.
     """
     with path.open("rb") as file:
         head = file.read(520)
@@ -30,7 +32,7 @@ def read_mat(path: Path) -> dict[str, Any]:
         if is_new:
             return _read_new(h5py, path)
         return dict(variables_of(path.read_bytes()))
-    except Exception as error:  # HDF5 raises whatever a damaged block leads to
+    except Exception as error:  # HDF5 raises any kind of error for a damaged block
         reason = str(error) or type(error).__name__
         raise InputError(f"{path}: is not a readable MATLAB file ({reason}). Is the file damaged?") from error
 
@@ -41,20 +43,20 @@ def _read_new(h5py: Any, path: Path) -> dict[str, Any]:
 
 
 def _word(name: str | bytes) -> str:
-    """A name that may not be UTF-8."""
+    """Return a name as text, even if it is not UTF-8."""
     return name.decode(errors="replace") if isinstance(name, bytes) else str(name)
 
 
 def _node(h5py: Any, file: Any, node: Any, depth: int) -> Any:
-    """A group or data set of MATLAB's layout: transposed arrays, text as numbers, cells and arrays of structs as references."""
+    """Read a group or data set in MATLAB's layout: transposed arrays, text as numbers, cells and struct arrays as references."""
     if depth > DEEPEST:
-        raise InputError(f"structs lie deeper than {DEEPEST} in each other")
+        raise InputError(f"structs are nested more than {DEEPEST} levels deep")
     kind = _word(node.attrs.get("MATLAB_class", ""))
     if "MATLAB_object_decode" in node.attrs:
         return Unread(kind or "an object")
     if isinstance(node, h5py.Group):
         parts = {_word(name): node[name] for name in node}
-        # The fields of an array of structs are references that do not say of what; a cell in a struct says that it is one.
+        # The fields of an array of structs are references without a class; a cell in a struct has the class cell.
         fields = {name: _node(h5py, file, one, depth + 1) for name, one in parts.items()}
         is_array = all(_is_bare(h5py, one) for one in parts.values())
         return _structs(fields) if fields and is_array else fields
@@ -62,7 +64,7 @@ def _node(h5py: Any, file: Any, node: Any, depth: int) -> Any:
         return "" if kind == "char" else np.zeros((0, 0))
     if h5py.check_ref_dtype(node.dtype) is not None:
         if node.size > MOST_CELLS:
-            raise InputError(f"{node.name}: {node.size} cells are no log")
+            raise InputError(f"{node.name}: {node.size} cells are too many for a log")
         cells = np.asarray(node[()]).ravel()
         return [_node(h5py, file, file[one], depth + 1) if one else np.zeros((0, 0)) for one in cells]
     values = np.asarray(node[()])
@@ -74,7 +76,7 @@ def _node(h5py: Any, file: Any, node: Any, depth: int) -> Any:
 
 
 def _is_bare(h5py: Any, node: Any) -> bool:
-    """Whether it holds references, and does not say that it is a cell."""
+    """Whether a node contains references, but has no class."""
     return (
         isinstance(node, h5py.Dataset)
         and h5py.check_ref_dtype(node.dtype) is not None
@@ -83,7 +85,7 @@ def _is_bare(h5py: Any, node: Any) -> bool:
 
 
 def _structs(fields: dict[str, list]) -> Any:
-    """The list of structs of fields that have a value a struct each."""
+    """Return the list of structs from fields that have one value per struct."""
     if len({len(values) for values in fields.values()}) != 1:
         raise InputError("the fields of an array of structs are of different lengths")
     parts = [dict(zip(fields, row, strict=True)) for row in zip(*fields.values(), strict=True)]

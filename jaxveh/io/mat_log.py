@@ -21,25 +21,27 @@ DATA_NAMES = ("data", "values", "value", "signals")
 UNIT_NAMES = ("units", "unit")
 NAME_NAMES = ("label", "name")
 WIDEST = 64
-"""Columns that a matrix may be taken apart into."""
+"""Largest number of columns into which a matrix is split."""
 
 _SECONDS = {"seconds": "s", "milliseconds": "ms", "microseconds": "us", "minutes": "min", "hours": "h"}
 
 
 class Clocks(NamedTuple):
-    """Where the time is that the channel map names ("" for none), and what makes seconds of a struct's own."""
+    """The path of the time that the channel map names ("" for none), and a function that converts a struct's time to seconds."""
 
     named: str
     in_seconds: Callable[[np.ndarray, Mapping[str, Any]], np.ndarray]
 
 
 def open_mat(path: Path, channels: ChannelMap | None) -> NestedLog:
-    """A `.mat` file of version 5 or 7.3. A struct with a time vector (`time`, `Time`, `t`, ...) has the columns beside it, and
-    those of structs below it of as many rows; `Data` or `values` have the name of their struct, a matrix is taken apart as
-    `name[0]`, `name[1]`, .... The channel map's `time` names the vector for all of as many rows that have none of their own, and
-    its unit is that of all clocks.
+    """Open a `.mat` file of version 5 or 7.3.
 
-    **Raises** `InputError` for a file in which no vector goes with a time vector, saying what was found.
+    A time vector in a struct (`time`, `Time`, `t`, ...) belongs to the columns beside it, and to those of the same length in
+    structs below it. `Data` or `values` have the name of their struct; a matrix is split into `name[0]`, `name[1]`, .... The
+    `time` of the channel map is the time of all columns of the same length that have no time vector of their own; its unit holds
+    for all time vectors.
+
+    **Raises** `InputError` for a file in which no vector belongs to a time vector, with a list of its contents.
     """
     content = read_mat(path)
     found, seen = {}, {}
@@ -55,9 +57,9 @@ def open_mat(path: Path, channels: ChannelMap | None) -> NestedLog:
     objects = {name: what for name, what in seen.items() if what not in ("time", "")}
     if not leaves:
         raise InputError(
-            f"{path}: no vector goes with a time vector ({', '.join(TIME_NAMES)}); found: {in_words(objects)}. "
-            'Name the time in a channel map: time = "COLUMN". Objects (timeseries, Dataset, timetable) only MATLAB can read: '
-            "save the fields, as in log.v_x.Time and log.v_x.Data."
+            f"{path}: no vector belongs to a time vector ({', '.join(TIME_NAMES)}); found: {in_words(objects)}. "
+            'Name the time in a channel map: time = "COLUMN". Only MATLAB can read objects (timeseries, Dataset, timetable): '
+            "save their fields, such as log.v_x.Time and log.v_x.Data."
         )
     return NestedLog(path, leaves, without=f"Not read: {in_words(objects)}." if objects else "")
 
@@ -65,7 +67,7 @@ def open_mat(path: Path, channels: ChannelMap | None) -> NestedLog:
 def _leaves(
     node: Any, path: str, short: str, time: np.ndarray | None, clocks: Clocks, seen: dict[str, str], unit: str = ""
 ) -> Iterator[Leaf]:
-    """The columns in a part of the file, which lies at `path` beneath a time vector; `seen` gets what is no column."""
+    """Yield the columns in the part of the file at `path`, below a time vector; everything else is added to `seen`."""
     if isinstance(node, Mapping):
         yield from _of_struct(node, path, short, time, clocks, seen)
     elif isinstance(node, list) and any(isinstance(one, Mapping) for one in node):
@@ -97,25 +99,25 @@ def _of_struct(
     for key, value in node.items():
         if key == name and own is not None:
             continue
-        # `log.vx.Data` is `log.vx`, and `scope.signals` what is in the scope.
+        # `log.vx.Data` is named `log.vx`, and the contents of `scope.signals` are named as those of `scope`.
         is_data = bool(path) and key.casefold() in DATA_NAMES and time is not None
         at, called = (path, short) if is_data else (below(key), key)
         yield from _leaves(value, at, called, time, clocks, seen, unit if is_data else "")
 
 
 def _named_time(path: Path, content: Mapping[str, Any], named: Channel) -> tuple[np.ndarray, str]:
-    """The vector that the channel map names as time, in seconds, and its path in the file."""
+    """Return the vector that the channel map names as time, in seconds, and its path in the file."""
     vectors = dict(_vectors(content, ""))
     shorts = [one.rpartition(".")[2] for one in vectors]
     places = {one.rpartition(".")[2]: one for one in vectors if shorts.count(one.rpartition(".")[2]) == 1}
     places |= {one: one for one in vectors}
-    check_known(str(path), "vector", named.column, places, "It is the time of the channel map.")
+    check_known(str(path), "vector", named.column, places, "It is the `time` of the channel map.")
     place = places[named.column]
     return _stamps(path, named, vectors[place]), place
 
 
 def _stamps(path: Path, named: Channel, values: np.ndarray) -> np.ndarray:
-    """Times as the channel map says them, in seconds."""
+    """Convert times to seconds, with the unit of the channel map."""
     stamps = apply(named, values)
     return convert(stamps, named.unit, "s", f"{path}: {named.column}") if is_unit(named.unit) else stamps
 
@@ -129,7 +131,7 @@ def _vectors(node: Any, path: str) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _vector(value: Any) -> np.ndarray | None:
-    """An array of numbers with one long side, as (n,); None for anything else."""
+    """Return an array of numbers with one long side as (n,); None for anything else."""
     numbers = isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size > 0
     if not numbers or max(value.shape) != value.size:
         return None
@@ -137,7 +139,7 @@ def _vector(value: Any) -> np.ndarray | None:
 
 
 def _columns(values: np.ndarray, rows: int) -> list[np.ndarray] | None:
-    """The columns (rows,) of an array one of whose sides is time; None where none is, or it holds no numbers."""
+    """Return the columns (rows,) of an array with time along one side; None if no side fits, or it has no numbers."""
     if values.dtype.kind not in "fiub" or values.size == 0:
         return None
     if (vector := values.ravel()).size == rows:
@@ -145,7 +147,7 @@ def _columns(values: np.ndarray, rows: int) -> list[np.ndarray] | None:
     shape = tuple(side for side in values.shape if side > 1)
     if rows not in shape or values.size // rows > WIDEST:
         return None
-    # Simulink has time last where a sample is a matrix, and first where it is a vector.
+    # Simulink has time last if a sample is a matrix, and first if it is a vector.
     along = 0 if shape[0] == rows else len(shape) - 1
     if shape[along] != rows:
         return None
@@ -154,14 +156,14 @@ def _columns(values: np.ndarray, rows: int) -> list[np.ndarray] | None:
 
 
 def _in_seconds(time: np.ndarray, node: Mapping[str, Any]) -> np.ndarray:
-    """Time as a timeseries' `TimeInfo` says it, in seconds."""
+    """Convert time to seconds, with the unit of a timeseries' `TimeInfo`."""
     unit = _text(node.get("TimeInfo"), UNIT_NAMES)
     unit = _SECONDS.get(unit, unit)
     return convert(time, unit, "s", "TimeInfo") if is_unit(unit) else time
 
 
 def _text(node: Any, names: tuple[str, ...]) -> str:
-    """The text of the first of these fields that has some, "" without."""
+    """Return the text of the first of these fields that has one; "" if none has."""
     if not isinstance(node, Mapping):
         return ""
     folded = {key.casefold(): value for key, value in node.items()}

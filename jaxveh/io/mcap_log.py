@@ -17,21 +17,21 @@ from jaxveh.io.log import numeric
 from jaxveh.io.optional import require
 
 MCAP_SUFFIX = ".mcap"
-"""What an MCAP file's name ends in."""
+"""The ending of an MCAP file's name."""
 LATEST = 2**63 / 1e9
-"""s: the largest stamp."""
+"""The largest time stamp, s."""
 
 
 def write_topics(topics: Mapping[str, Any], path: str | os.PathLike, *, overwrite: bool = False) -> None:
-    """Write data frames as topics of an `.mcap` file, such as `/estimate`, `/log` and `/truth`, all or nothing.
+    """Write data frames as topics of an `.mcap` file, such as `/estimate`, `/log` and `/truth`, completely or not at all.
 
     `topics`: name to a data frame with a column `time` (s, at least zero, strictly increasing) and columns of numbers, as
-    `to_frame` makes them. A message a row: its JSON has a number a column, with none where it is not finite, and is stamped
-    with the row's time in nanoseconds; messages of all topics stand in the order of time. The schema names each column's unit,
-    of `frame.attrs["units"]`, in its `description`; `frame.attrs["source"]` is the channel's metadata `source`.
+    `to_frame` makes them. Each row is a message: its JSON has one number per column, without those that are not finite, and is
+    stamped with the row's time in nanoseconds. The messages of all topics are ordered by time. The schema has each column's
+    unit, from `frame.attrs["units"]`, in its `description`; `frame.attrs["source"]` is the channel's metadata `source`.
 
     **Raises** `InputError` for another suffix, no topic, a frame without `time` or with columns that are not numbers, times that
-    cannot be stamped, or where the file exists and `overwrite` is False.
+    cannot be time stamps, or if the file exists and `overwrite` is False.
     """
     path = Path(path)
     check_suffix(path, (MCAP_SUFFIX,), "recording of topics")
@@ -53,7 +53,7 @@ def write_topics(topics: Mapping[str, Any], path: str | os.PathLike, *, overwrit
 
 
 def _columns(frame: Any, what: str) -> tuple[list[int], dict[str, np.ndarray]]:
-    """Stamps (T,) in nanoseconds, and columns (T,) by name."""
+    """Return time stamps (T,) in nanoseconds, and columns (T,) by name."""
     if "time" not in frame.columns:
         raise InputError(f"{what}: no column `time`; there are: {', '.join(map(str, frame.columns))}.")
     columns = {str(name): numeric(frame[name].to_numpy(), f"{what}: column {name!r}") for name in frame.columns}
@@ -62,15 +62,15 @@ def _columns(frame: Any, what: str) -> tuple[list[int], dict[str, np.ndarray]]:
     if wrong.any():
         k = int(np.argmax(wrong))
         raise InputError(
-            f"{what}: time[{k}] = {time[k]}: stamps must be at least zero, and strictly increasing. Shift the log's time, or "
+            f"{what}: time[{k}] = {time[k]}: time stamps must be at least zero and strictly increasing. Shift the log's time, or "
             "write another format."
         )
-    # A product of large seconds would not be exact.
+    # Multiplying large numbers of seconds by 1e9 would not be exact.
     return [int(value) * 10**9 + round(value % 1.0 * 1e9) for value in time.tolist()], columns
 
 
 def _register(writer: Any, topic: str, columns: Mapping[str, Any], units: Mapping[str, str], source: str) -> int:
-    """The channel of a topic, with a schema that has each column's unit."""
+    """Register the channel of a topic, with a schema that has each column's unit."""
     properties = {
         name: {"type": "number", **({"description": units[name]} if name in units else {})} for name in columns
     }
@@ -83,9 +83,9 @@ def _register(writer: Any, topic: str, columns: Mapping[str, Any], units: Mappin
 def _messages(
     stamps: list[int], columns: Mapping[str, np.ndarray], place: int, channel: int
 ) -> Iterator[tuple[int, int, int, int, bytes]]:
-    """Each row's stamp (ns), the topic's place, which stands in for it among rows of one stamp, the row, channel and message."""
+    """Yield per row: time stamp (ns), place of the topic (orders rows with equal time stamps), row, channel and message."""
     names = list(columns)
-    # A column's own precision: single stays as short as it is.
+    # Numbers are written in the precision of their column: single precision stays short.
     values = [_plain(column) for column in columns.values()]
     for row, stamp in enumerate(stamps):
         message = {name: text for name, column in zip(names, values, strict=True) if (text := column[row]) is not None}
@@ -93,8 +93,8 @@ def _messages(
 
 
 def _plain(column: np.ndarray) -> list[str | None]:
-    """Numbers as JSON writes them, shortest in the column's own precision; None for what is not finite."""
-    # What is not NumPy's own (bfloat16) writes minus zero as a whole number, which has no sign.
+    """Return numbers as JSON text, the shortest in the column's precision; None for numbers that are not finite."""
+    # A type that NumPy does not have (bfloat16) writes minus zero as an integer, which has no sign.
     column = column.astype(np.float32) if column.dtype.kind == "V" else column
     finite = np.isfinite(column)
     return [str(value) if known else None for value, known in zip(column, finite, strict=True)]

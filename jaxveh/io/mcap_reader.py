@@ -1,4 +1,4 @@
-"""MCAP as a log: topics of JSON messages (and ROS 2's, with its own library), each with stamps of its own."""
+"""MCAP as a log: topics of JSON messages (and of ROS 2, with its own library), each with its own time stamps."""
 
 from __future__ import annotations
 
@@ -17,20 +17,22 @@ from jaxveh.io.optional import require
 from jaxveh.io.units import is_unit
 
 WIDEST = 64
-"""Numbers of a list that become columns; longer ones are pictures and scans."""
+"""Longest list whose numbers become columns; longer lists are pictures and scans."""
 DEEPEST = 16
 
 ROS2 = "mcap-ros2-support"
 
 
 def open_mcap(path: Path, channels: ChannelMap | None) -> NestedLog:
-    """An `.mcap` file. Each number of a topic's messages is a column: `angular_velocity.z` of `/imu` by that name where no other
-    topic has it, else as `/imu.angular_velocity.z`; lists of at most 64 numbers are taken apart as `name[0]`, truth values are 0
-    and 1, what is null or left out is NaN, words are left. Time is the message's log time, in whole nanoseconds.
+    """Open an `.mcap` file as a log, with a column for each number of a topic's messages.
 
-    Units are read of topics that `write_topics` wrote. ROS 2 messages (`cdr`) are read where `mcap-ros2-support` is installed.
+    `angular_velocity.z` of `/imu` has that name if no other topic has it, otherwise `/imu.angular_velocity.z`. Lists of at
+    most 64 numbers become columns `name[0]`, ...; truth values are 0 and 1; null and missing values are NaN; texts are ignored.
+    Time is the message's log time, in whole nanoseconds.
 
-    **Raises** `InputError` for a damaged file, or one without a topic that can be read, saying which there are.
+    Units are read from topics that `write_topics` wrote. ROS 2 messages (`cdr`) are read if `mcap-ros2-support` is installed.
+
+    **Raises** `InputError` for a damaged file, or a file without a readable topic, with a list of its topics.
     """
     reading = require("mcap.reader", "reading MCAP", "mcap")
     topics, unread, decoders = {}, {}, {}
@@ -47,13 +49,13 @@ def open_mcap(path: Path, channels: ChannelMap | None) -> NestedLog:
                 topic.add(message.log_time, decode(message.data))
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
-    except Exception as error:  # the reader raises whatever a damaged record leads to
+    except Exception as error:  # the reader raises any kind of error for a damaged record
         reason = str(error) or type(error).__name__
         raise InputError(f"{path}: is not a readable MCAP file ({reason}). Is the file damaged?") from error
     leaves = [leaf for topic in topics.values() for leaf in topic.leaves()]
-    cdr = f" ROS 2 topics need a library of their own: run `pip install {ROS2}`." if "cdr" in unread.values() else ""
+    cdr = f" ROS 2 topics need a further library: run `pip install {ROS2}`." if "cdr" in unread.values() else ""
     if not leaves:
-        empty = dict.fromkeys(topics, "no number in it")
+        empty = dict.fromkeys(topics, "no numbers")
         raise InputError(
             f"{path}: no topic of JSON messages with numbers; found: {in_words({**unread, **empty})}.{cdr}"
         )
@@ -62,7 +64,7 @@ def open_mcap(path: Path, channels: ChannelMap | None) -> NestedLog:
 
 
 class _Topic:
-    """What a topic has said so far."""
+    """The messages of a topic so far."""
 
     def __init__(self, channel: Any, schema: Any):
         self.name = channel.topic
@@ -76,8 +78,8 @@ class _Topic:
         self._rows.append(dict(_numbers(message, "", 0)))
 
     def leaves(self) -> Iterator[Leaf]:
-        """A column a number, in the order in which they were first said."""
-        # A quotient of whole numbers is rounded once.
+        """Yield one column per number, in the order of their first occurrence."""
+        # A quotient of integers is rounded only once.
         time = np.array([stamp / 10**9 for stamp in self._stamps])
         for name in dict.fromkeys(name for row in self._rows for name in row):
             values = np.array([row.get(name, np.nan) for row in self._rows])
@@ -85,9 +87,9 @@ class _Topic:
 
 
 def _numbers(value: Any, name: str, depth: int) -> Iterator[tuple[str, float]]:
-    """The numbers of a message by dotted names."""
+    """Yield the numbers of a message by dotted names."""
     if depth > DEEPEST:
-        raise InputError(f"a message lies deeper than {DEEPEST} in itself.")
+        raise InputError(f"a message is nested more than {DEEPEST} levels deep.")
     if isinstance(value, Mapping):
         for key, one in value.items():
             yield from _numbers(one, f"{name}.{key}" if name else str(key), depth + 1)
@@ -102,7 +104,7 @@ def _numbers(value: Any, name: str, depth: int) -> Iterator[tuple[str, float]]:
 
 
 def _units(schema: Any) -> dict[str, str]:
-    """Units by column, of a schema that `write_topics` wrote; others' descriptions are prose."""
+    """Return units by column from a schema that `write_topics` wrote; the descriptions of other schemas are prose."""
     if schema is None or not schema.name.startswith("jaxveh."):
         return {}
     properties = json.loads(schema.data).get("properties", {})
@@ -111,7 +113,7 @@ def _units(schema: Any) -> dict[str, str]:
 
 
 def _decoder(channel: Any, schema: Any, unread: dict[str, str]) -> Any:
-    """What makes a mapping of a message's bytes, None for a topic that cannot be read, which `unread` gets with its encoding."""
+    """Return a function from a message's bytes to a mapping; None for an unreadable topic, which is added to `unread`."""
     if channel.message_encoding == "json":
         return json.loads
     if channel.message_encoding == "cdr":
@@ -127,7 +129,7 @@ def _decoder(channel: Any, schema: Any, unread: dict[str, str]) -> Any:
 
 
 def _as_mapping(message: Any) -> Any:
-    """A ROS 2 message as mappings and lists."""
+    """Return a ROS 2 message as mappings and lists."""
     if isinstance(message, list | tuple):
         return [_as_mapping(one) for one in message]
     names = getattr(message, "__slots__", None) or getattr(message, "__dict__", None)

@@ -1,4 +1,4 @@
-"""MDF4 through asammdf: every channel group has a time base of its own."""
+"""MDF4 through asammdf: every channel group has its own time base."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from jaxveh.io.log import Column, Log, numeric
 from jaxveh.io.naming import check_known
 from jaxveh.io.optional import quiet_finalizers, require
 
-_TIME_SYNC = (0, 1)  # a master without a kind, or one that counts time (others count angle, distance, index)
+_TIME_SYNC = (0, 1)  # a master channel of no kind, or of time (others are of angle, distance or index)
 
 
 class MdfLog(Log):
-    """An MDF file (version 3 or 4). Samples that the file marks invalid are left out, words stay their raw numbers."""
+    """An MDF file (version 3 or 4). Samples that the file marks as invalid are left out; texts are read as their raw numbers."""
 
     def __init__(self, path: Path, mdf: Any):
         self.path, self._mdf = path, mdf
@@ -31,7 +31,7 @@ class MdfLog(Log):
         self.names = tuple(self._places)
 
     def column(self, name: str, group: int | None = None) -> Column:
-        """Load one channel; `group` picks one where several groups have a channel of this name."""
+        """Load one channel; `group` selects one if several groups have a channel of this name."""
         check_known(str(self.path), "channel", name, self._places, "Name the file's channel in the channel map.")
         groups = [place[0] for place in self._places[name]]
         found = [place for place in self._places[name] if group is None or place[0] == group]
@@ -39,14 +39,14 @@ class MdfLog(Log):
         if len(found) != 1:
             asked = "no group is named" if group is None else f"group = {group}"
             there = ", ".join(map(str, groups))
-            raise InputError(f"{what}: {asked}, and it is in {there}; say which with `group` in the channel map.")
+            raise InputError(f"{what}: {asked}, but it is in {there}; give one of them as `group` in the channel map.")
         self._check_master(found[0][0], what)
         try:
             signal = self._mdf.get(name, *found[0])
             if signal.samples.dtype.kind in "SUO" and signal.conversion is None:
                 raw = self._mdf.get(name, *found[0], raw=True)
                 signal = raw if raw.conversion is not None else signal
-        except Exception as error:  # asammdf raises whatever a damaged block leads to
+        except Exception as error:  # asammdf raises any kind of error for a damaged block
             raise InputError(f"{what}: cannot be read ({error}). Is the file damaged?") from error
         time = np.asarray(signal.timestamps, dtype=np.float64)
         if np.any(np.diff(time) <= 0):
@@ -58,7 +58,7 @@ class MdfLog(Log):
         return Column(time, numeric(signal.samples, what), str(signal.unit or ""))
 
     def close(self) -> None:
-        """Give the file back."""
+        """Close the file."""
         self._mdf.close()
 
     def _check_master(self, group: int, what: str) -> None:
@@ -70,26 +70,26 @@ class MdfLog(Log):
 
 
 def open_mdf(path: Path, channels: ChannelMap | None) -> MdfLog:
-    """An MDF3 or MDF4 file. Time is each group's own master channel; a time column in the channel map is not used."""
+    """Open an MDF3 or MDF4 file; time is each group's own master channel, and a time column in the channel map is not used."""
     asammdf = require("asammdf", "reading MDF4")
     with quiet_finalizers():
         try:
             return MdfLog(path, asammdf.MDF(path))
-        except Exception as error:  # asammdf raises whatever a damaged block leads to
+        except Exception as error:  # asammdf raises any kind of error for a damaged block
             reason = str(error) or type(error).__name__
         gc.collect()
     raise InputError(f"{path}: is not a readable MDF file ({reason}).")
 
 
 def _stored(values: np.ndarray) -> np.ndarray:
-    """Samples of a type that the writer has: single precision for half."""
+    """Return samples of a type that the writer supports: single precision for half."""
     return np.asarray(values, np.float32 if values.dtype.itemsize == 2 else None)
 
 
 def write_mdf(
     path: Path, time: np.ndarray, columns: Mapping[str, np.ndarray], units: Mapping[str, str], note: str
 ) -> None:
-    """One channel group of MDF 4.10 over one time base; NaN stays NaN; the note is the header's comment."""
+    """Write one channel group of MDF 4.10 over one time base; NaN stays NaN, and the note becomes the header's comment."""
     asammdf = require("asammdf", "writing MDF4")
     signals = [
         asammdf.Signal(samples=_stored(values), timestamps=time, name=name, unit=units.get(name, ""))

@@ -1,4 +1,4 @@
-"""Columns with time stamps of their own over one time base."""
+"""Columns with their own time stamps over one common time base."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from jaxveh.io.log import Column
 
 
 def merge(columns: Mapping[str, Column]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """One time base (T,) with every stamp of every column, and each column's values (T,), NaN where it has no stamp.
+    """Return one time base (T,) with all time stamps of all columns, and each column's values (T,), NaN where it has no sample.
 
-    Nothing is interpolated and no stamp is moved: stamps that differ in the last bit are two rows. Columns without any
+    Nothing is interpolated and no time stamp is moved: two that differ in the last bit are two rows. Columns without any
     sample are NaN throughout.
     """
     bases = list({id(column.time): column.time for column in columns.values()}.values())
@@ -31,12 +31,12 @@ def merge(columns: Mapping[str, Column]) -> tuple[np.ndarray, dict[str, np.ndarr
 
 
 def resample(recording: Recording, raster: str, method: str = "linear", max_gap: float = np.inf) -> Recording:
-    """The rows in which channel `raster` speaks, the other channels filled there by `linear` or `hold`.
+    """Return the rows in which channel `raster` has a measurement; the others are filled by `method`, `linear` or `hold`.
 
-    Gaps longer than `max_gap` seconds stay NaN, and so does what lies outside a channel's own samples. Nothing is
-    low-passed: a channel with more samples than `raster` may alias. Host side, outside jit.
+    Gaps longer than `max_gap` seconds stay NaN, and so do rows before the first sample of a channel and, with `linear`, after its
+    last. No low-pass is applied: a channel with more samples than `raster` may alias. Runs on the host, outside jit.
 
-    **Raises** `InputError` for an unknown channel or method, or where `raster` has no sample.
+    **Raises** `InputError` for an unknown channel or method, or if `raster` has no sample.
     """
     check_one_of("method", method, ("linear", "hold"))
     check_names("resample: raster", [raster], recording.names)

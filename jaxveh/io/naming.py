@@ -1,4 +1,4 @@
-"""Messages about names that are not there: the nearest ones first."""
+"""Messages about unknown names, with the nearest known names first."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _SHOWN = 30
 
 
 def listing(name: str, names: Iterable[str]) -> str:
-    """All names in words, those that look like `name` first; a long list is cut and counted."""
+    """List all names in words, those similar to `name` first; a long list is cut, with a count of the rest."""
     names = list(names)
     close = near(name, names)
     ordered = close + [candidate for candidate in names if candidate not in close]

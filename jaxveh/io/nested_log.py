@@ -1,4 +1,4 @@
-"""Logs whose columns lie in a tree: MATLAB's structs and messages with fields of their own."""
+"""Logs whose columns form a tree: MATLAB's structs, and messages with nested fields."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from jaxveh.io.naming import check_known
 
 
 class Leaf(NamedTuple):
-    """A column by its whole `path` in the file (such as `log.speed`, or `/imu.angular_velocity.z`) and its `short` name."""
+    """A column with its full `path` in the file (such as `log.speed`, or `/imu.angular_velocity.z`) and its `short` name."""
 
     path: str
     short: str
@@ -24,8 +24,10 @@ class Leaf(NamedTuple):
 
 
 class NestedLog(Log):
-    """A log of leaves with time stamps of their own. A column has its short name where no other has it, else its whole path; it
-    can be asked for by either."""
+    """A log of leaves with their own time stamps.
+
+    A column has its short name if that is unique, otherwise its full path; it can be loaded by either name.
+    """
 
     def __init__(self, path: Path, leaves: Sequence[Leaf], note: str = "", without: str = ""):
         self.path, self.note = path, note
@@ -52,7 +54,7 @@ class NestedLog(Log):
 
 
 def in_words(names: Mapping[str, str] | Sequence[str], most: int = 12) -> str:
-    """Names in words, with what each is where a mapping says so; a long list is cut and counted."""
+    """List names in words, with the description of each if `names` is a mapping; a long list is cut, with a count of the rest."""
     words = [f"{name} ({what})" for name, what in names.items()] if isinstance(names, Mapping) else list(names)
     more = f", and {len(words) - most} more" if len(words) > most else ""
     return ", ".join(words[:most]) + more if words else "nothing"

@@ -1,4 +1,4 @@
-"""NetCDF 4 through xarray and h5netcdf: every name, unit and type of a result, and logs of strangers."""
+"""NetCDF 4 through xarray and h5netcdf: results with every name, unit and type, and logs from other programs."""
 
 from __future__ import annotations
 
@@ -20,14 +20,17 @@ from jaxveh.io.optional import quiet_finalizers, require
 from jaxveh.io.units import is_unit
 
 NAME, DTYPE, DIMS = "jaxveh_name", "jaxveh_dtype", "jaxveh_dims"
-"""Attributes of a variable whose name, or type, the format does not have, and of a dataset with such names of dimensions."""
+"""Attributes for names and types of variables, and names of dimensions, that the format does not allow."""
 
 _PLAIN = re.compile(r"[A-Za-z_][\w.]*")
 ENGINE = "h5netcdf"
 
 
 def write_netcdf(path: Path, labelled: Labelled) -> None:
-    """A result's dataset. Names that NetCDF does not take are written otherwise, half precision as single; attributes say so."""
+    """Write a result's dataset.
+
+    Names that NetCDF does not allow are replaced, and half precision becomes single; attributes record both.
+    """
     require("h5netcdf", "writing NetCDF")
     dataset = dataset_of(labelled)
     names = {name: f"v{k}" for k, name in enumerate(dataset.variables) if not _PLAIN.fullmatch(str(name))}
@@ -43,23 +46,23 @@ def write_netcdf(path: Path, labelled: Labelled) -> None:
     if dims:
         dataset.attrs[DIMS] = json.dumps({new: str(old) for old, new in dims.items()})
     dataset = dataset.rename({**names, **dims})
-    # xarray would put NaN in the place of what is missing, and nothing is.
+    # xarray would write a fill value for missing data; there are no missing data.
     encoding = {name: {"_FillValue": None} for name in dataset.variables}
-    # Into memory first: HDF5 ends the process where the disk is full.
+    # Into memory first: HDF5 ends the process if the disk is full.
     content = streams.BytesIO()
     dataset.to_netcdf(content, engine=ENGINE, encoding=encoding)
     path.write_bytes(content.getvalue())
 
 
 def read_netcdf(path: Path) -> Labelled:
-    """What `write_netcdf` wrote, or a stranger's dataset. **Raises** `InputError` for a damaged file."""
+    """Read a file of `write_netcdf`, or a dataset from another program. **Raises** `InputError` for a damaged file."""
     require("h5netcdf", "reading NetCDF")
     with quiet_finalizers():
         try:
             return _read(path)
         except InputError:
             raise
-        except Exception as error:  # HDF5 raises whatever a damaged block leads to
+        except Exception as error:  # HDF5 raises any kind of error for a damaged block
             reason = str(error) or type(error).__name__
     raise InputError(f"{path}: is not a readable NetCDF 4 file ({reason}). Is the file damaged?")
 
@@ -90,7 +93,7 @@ def _typed(dataset: Any, variables: Mapping[str, Variable]) -> dict[str, Variabl
 
 
 def open_netcdf(path: Path, channels: ChannelMap | None) -> TableLog:
-    """A NetCDF file as a log: its variables over the dimension of its time, with their `units`; all else is left."""
+    """Open a NetCDF file as a log: its variables over the dimension of time, with their `units`; other variables are ignored."""
     labelled = read_netcdf(path)
     both = labelled.both
     named = channels.time.column if channels is not None and channels.time is not None else None
@@ -107,7 +110,7 @@ def open_netcdf(path: Path, channels: ChannelMap | None) -> TableLog:
 def write_recording_netcdf(
     path: Path, time: np.ndarray, columns: Mapping[str, np.ndarray], units: Mapping[str, str], note: str
 ) -> None:
-    """Columns over time, as `Recording.to_xarray` has them."""
+    """Write columns over time, in the form of `Recording.to_xarray`."""
     variables = {name: Variable((TIME,), values, units.get(name, "")) for name, values in columns.items()}
     facts = {"units": dict(units), "time": [], "jax": False}
     write_netcdf(

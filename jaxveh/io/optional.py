@@ -1,4 +1,4 @@
-"""Optional libraries, imported where they are used."""
+"""Optional libraries, imported when they are used."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jaxveh._core.errors import InputError
 
 
 def require(module: str, purpose: str, extra: str = "io") -> Any:
-    """The module, or an `InputError` that says what needs it and how to install it."""
+    """Import a module; if it is missing, raise `InputError` with the `purpose` that needs it and the `extra` that installs it."""
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:
@@ -26,7 +26,7 @@ def require(module: str, purpose: str, extra: str = "io") -> Any:
 
 @contextlib.contextmanager
 def quiet_finalizers() -> Iterator[None]:
-    """Finalizers of asammdf and h5netcdf fail on a file that they could not open; Python would print that beside our error."""
+    """Silence the finalizers of asammdf and h5netcdf, which fail on a file that they could not open and would print errors."""
     hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         yield

@@ -17,11 +17,11 @@ _UNIT = b"unit"
 _UNITS = (_UNIT, b"units", b"Unit", b"Units")
 _SOURCE = b"source"
 _OWN, _DTYPE = b"jaxveh", b"dtype"
-"""Says that the columns' types are those of a recording, and of a column the type that Parquet does not have."""
+"""Metadata keys: one marks a file saved from a recording, the other has the type of a column that Parquet does not support."""
 
 
 def open_parquet(path: Path, channels: ChannelMap | None) -> TableLog:
-    """A Parquet file; a field's metadata `unit` is its unit, the table's `source` its note. Loads only what is used."""
+    """Open a Parquet file; a field's metadata `unit` is its unit, the table's `source` its note. Only used columns are loaded."""
     require("pyarrow", "reading Parquet")
     parquet = require("pyarrow.parquet", "reading Parquet")
     try:
@@ -31,7 +31,7 @@ def open_parquet(path: Path, channels: ChannelMap | None) -> TableLog:
         note = (schema.metadata or {}).get(_SOURCE, b"").decode()
         told = {name: (schema.field(schema.names.index(name)).metadata or {}).get(_DTYPE) for name in headings}
         odd = {name: ml_dtypes.bfloat16 for name, dtype in told.items() if dtype == b"bfloat16"}
-    except Exception as error:  # pyarrow raises whatever a damaged block leads to
+    except Exception as error:  # pyarrow raises any kind of error for a damaged block
         raise InputError(f"{path}: is not a readable Parquet file ({error}).") from error
     twice = sorted({name for name in headings if headings.count(name) > 1})
     if twice:
@@ -53,7 +53,7 @@ def open_parquet(path: Path, channels: ChannelMap | None) -> TableLog:
 def write_parquet(
     path: Path, time: np.ndarray, columns: Mapping[str, np.ndarray], units: Mapping[str, str], note: str
 ) -> None:
-    """Columns in their own float precision, units and note as `open_parquet` reads them."""
+    """Write columns in their own float precision, with units and note in the form that `open_parquet` reads."""
     arrow = require("pyarrow", "writing Parquet")
     parquet = require("pyarrow.parquet", "writing Parquet")
     arrays = {"time": time, **columns}

@@ -1,4 +1,4 @@
-"""Tyre property files (.tir): read as they are written in the world, written back without loss."""
+"""Tyre property files (.tir): read in all the variants in use, and written back without loss."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ PROPERTY_UNITS = {
     "MASS": {"kg": 1.0, "kilogram": 1.0, "gram": 1e-3, "pound_mass": 0.45359237},
     "TIME": {"second": 1.0, "sec": 1.0, "s": 1.0, "millisecond": 1e-3},
 }
-"""What a [UNITS] section may say, and its size in SI."""
+"""The allowed units of a [UNITS] section, and their size in SI."""
 
 _SECTION = re.compile(r"^\s*\[(?P<name>[^\]]+)\]\s*$")
-# A value is a text in quotes, or all up to a comment.
+# A value is a text in quotes, or everything up to a comment.
 _ENTRY = re.compile(
     r"^(?P<lead>\s*(?P<key>[A-Za-z_][\w.]*)\s*=[^\S\r\n]*)"
     r"(?P<value>'[^'\r\n]*'|\"[^\"\r\n]*\"|[^$!\r\n]*[^$!\s]|)(?P<rest>.*)$",
     re.DOTALL,
 )
 SHOWN = 40
-"""So many characters of a value are shown in a message."""
+"""Largest number of characters of a value in a message."""
 
 
 @dataclass(frozen=True)
 class Entry:
     """One line `key = value` of a property file: `section`, `key`, `value`, its `line` from 1.
 
-    `value`: a float where one finite number stands there, else the text: without its quotes where it has some (`quoted`), as it
-    stands where it has none, and empty where there is nothing.
+    `value`: a float if it is one finite number, otherwise the text, which is empty if there is none; `quoted`: whether the text
+    was in quotes, which are removed.
     """
 
     section: str
@@ -55,9 +55,9 @@ class Entry:
 
 @dataclass(frozen=True)
 class PropertyFile:
-    """A tyre property file: its `lines` as they are, line ends included, and the `entries` found in them.
+    """A tyre property file: its `lines` unchanged, line ends included, and the `entries` found in them.
 
-    Comments (`$`, `!`), tables such as [SHAPE] and sections that nobody knows are kept in `lines`.
+    Comments (`$`, `!`), tables such as [SHAPE] and unknown sections are kept in `lines`.
     """
 
     source: str
@@ -73,9 +73,9 @@ class PropertyFile:
         return found
 
     def find(self, key: str) -> Entry | None:
-        """The entry of that name that has a value, wherever it stands; None where there is none.
+        """Return the entry of that name that has a value, from any section; None if there is none.
 
-        **Raises** `InputError` where several disagree about it.
+        **Raises** `InputError` if there are several with different values.
         """
         return _one(self.source, key, self._by_key.get(key, []))
 
@@ -91,16 +91,16 @@ class PropertyFile:
         return found
 
     def number(self, key: str, default: float | None = None) -> float:
-        """The number of that name; `default` where the file is silent.
+        """Return the number of that name; `default` if the file has no value.
 
-        **Raises** `InputError` for what is not one finite number, and for silence without a default.
+        **Raises** `InputError` if the value is not one finite number, or is missing and there is no default.
         """
         entry = self.find(key)
         if entry is None:
             if default is None:
                 raise InputError(
-                    f"{self.source}: {key} {'has no value' if self.holds(key) else 'is missing'}, and this tyre cannot do "
-                    f"without: {'complete' if self.holds(key) else 'add'} the line `{key} = ...`."
+                    f"{self.source}: {key} {'has no value' if self.holds(key) else 'is missing'}, but this tyre needs "
+                    f"it: {'complete' if self.holds(key) else 'add'} the line `{key} = ...`."
                 )
             return default
         if isinstance(entry.value, str):
@@ -110,14 +110,14 @@ class PropertyFile:
         return entry.value
 
     def text(self, key: str, default: str = "") -> str:
-        """The text of that name, numbers as they print."""
+        """Return the text of that name; a number is formatted as text."""
         entry = self.find(key)
         if entry is None:
             return default
         return entry.value if isinstance(entry.value, str) else f"{entry.value:g}"
 
     def unit(self, quantity: str) -> float:
-        """The size in SI of the file's unit of `LENGTH`, `FORCE`, `ANGLE`, `MASS` or `TIME`; 1 where it is silent."""
+        """Return the size in SI of the file's unit of `LENGTH`, `FORCE`, `ANGLE`, `MASS` or `TIME`; 1 if it names none."""
         entry = _one(self.source, quantity, [e for e in self._by_key.get(quantity, []) if e.section == "UNITS"])
         if entry is None:
             return 1.0
@@ -129,9 +129,9 @@ class PropertyFile:
         return known[said]
 
     def replace(self, values: Mapping[str, float]) -> PropertyFile:
-        """The same file with other numbers; everything else stays as it is, comments and columns included.
+        """Return the file with other numbers; everything else is unchanged, comments and columns included.
 
-        **Raises** `InputError` for a key that the file does not hold.
+        **Raises** `InputError` for a key that is not in the file.
         """
         lines = list(self.lines)
         for key, value in values.items():
@@ -147,25 +147,25 @@ class PropertyFile:
 
 
 def _one(source: str, key: str, entries: list[Entry]) -> Entry | None:
-    """The first of the entries that have a value. **Raises** `InputError` where they disagree."""
+    """Return the first entry that has a value. **Raises** `InputError` if the values differ."""
     told = [entry for entry in entries if entry.value != ""]
     if len({str(entry.value) for entry in told}) > 1:
         places = ", ".join(f"{e.short_value} in [{e.section}], line {e.line}" for e in told)
-        raise InputError(f"{source}: {key} has several values: {places}. Leave one.")
+        raise InputError(f"{source}: {key} has several values: {places}. Keep one.")
     return told[0] if told else None
 
 
 def read_property_file(path: str | Path) -> PropertyFile:
     """Read a .tir file.
 
-    What is no number stays as text: it is for whoever needs that number to object (`PropertyFile.number` does).
+    Values that are not numbers stay text; `PropertyFile.number` raises when such a number is needed.
 
-    **Raises** `InputError` for a file that is missing, holds no section with entries, or is no text in UTF-8 or one of the
-    codes of single bytes.
+    **Raises** `InputError` for a file that is missing, has no section with entries, or is not text in UTF-8 or a
+    single-byte encoding.
     """
     path = Path(path)
     check_readable(path)
-    # Bytes that are no UTF-8 (a degree sign in a comment) come back as they were.
+    # Bytes that are not UTF-8 (a degree sign in a comment) are written back unchanged.
     with open(path, encoding="utf-8", errors="surrogateescape", newline="") as file:
         return parse_property_file(file.read(), str(path))
 
@@ -173,7 +173,7 @@ def read_property_file(path: str | Path) -> PropertyFile:
 def parse_property_file(text: str, source: str = "property file") -> PropertyFile:
     """Parse the text of a .tir file; see `read_property_file`."""
     if "\0" in text:
-        raise InputError(f"{source}: holds zero bytes: it is no text, or one in UTF-16; save it as UTF-8.")
+        raise InputError(f"{source}: contains zero bytes: it is not text, or is in UTF-16; save it as UTF-8.")
     lines = tuple(re.findall(r"[^\r\n]*(?:\r\n|\n|\r)|[^\r\n]+$", text))
     section, entries = "", []
     for number, line in enumerate(lines, start=1):
@@ -183,20 +183,20 @@ def parse_property_file(text: str, source: str = "property file") -> PropertyFil
             section = heading["name"].strip().upper()
             continue
         entry = _ENTRY.match(bare)
-        # What stands before any section is a preamble; other lines are comments and rows of tables.
+        # Lines before the first section are a preamble; other lines are comments and rows of tables.
         if not entry or not section or bare.lstrip().startswith(("$", "!", "{")):
             continue
         value, quoted = _value(entry["value"])
         entries.append(Entry(section, entry["key"], value, number, quoted))
     if not entries:
-        raise InputError(f"{source}: no section with entries: this is no tyre property file (.tir).")
+        raise InputError(f"{source}: no section with entries: this is not a tyre property file (.tir).")
     return PropertyFile(source, lines, tuple(entries))
 
 
 def write_property_file(file: PropertyFile, path: str | Path, *, overwrite: bool = False) -> None:
-    """Write a property file; one that was read and not changed comes out byte for byte.
+    """Write a property file; a file that was read and not changed is written back byte for byte.
 
-    **Raises** `InputError` where the file exists and `overwrite` is not set.
+    **Raises** `InputError` if the file exists and `overwrite` is not set.
     """
     with (
         replacing_file(path, overwrite) as part,
@@ -210,7 +210,7 @@ def _without_comment(line: str) -> str:
 
 
 def _value(text: str) -> tuple[float | str, bool]:
-    """What stands there, and whether it is in quotes."""
+    """Return the value of a text, and whether it was in quotes."""
     if len(text) > 1 and text[0] in "'\"" and text[-1] == text[0]:
         return text[1:-1], True
     try:
@@ -220,12 +220,12 @@ def _value(text: str) -> tuple[float | str, bool]:
 
 
 def _with_value(line: str, text: str) -> str:
-    """The line with another value, the comment where it was if the width allows."""
+    """Return the line with another value; its comment stays in its column if the width allows."""
     found = _ENTRY.match(line)
     assert found is not None
     lead, rest = found["lead"], found["rest"]
     if not found["value"]:
-        # Blanks up to a comment are room for the value that is not there yet.
+        # The value is empty: the blanks before the comment are room for it.
         lead = lead.rstrip() + " "
         rest = " " * (len(found["lead"]) - len(lead)) + rest
     width = len(found["value"]) + len(rest) - len(rest.lstrip(" "))

@@ -1,4 +1,4 @@
-"""Recordings in and out: CSV, Parquet, MDF4; in from MATLAB and MCAP."""
+"""Reading and writing of recordings: CSV, Parquet, MDF4, NetCDF; MATLAB and MCAP for reading."""
 
 from __future__ import annotations
 
@@ -58,25 +58,25 @@ def read_recording(
     NetCDF 4 (`.nc`).
 
     **Arguments**: `channels`: a channel map or the path of one (see `io.channel_map.CHANNEL_MAP_SCHEMA`); without it every column
-    is a channel of the name it has, and time is the column `time`, `timestamps`, `timestamp` or `t`. `raster`: the name
-    of a channel whose samples become the rows, the others filled there by `method` (`linear`, `hold`; `io.resample`).
+    is a channel with its own name, and time is the column `time`, `timestamps`, `timestamp` or `t`. `raster`: the name
+    of a channel whose samples become the rows; the others are filled there by `method` (`linear`, `hold`; `io.resample`).
 
-    **Units**: the channel map's, else the file's own (Parquet: the field's metadata `unit`; MDF4: the channel's unit; MATLAB:
-    `Units` beside the data; CSV and Parquet: `name [unit]` in the first line), else SI is taken for granted. Channels of
-    `io.CANONICAL` come out in SI; other names keep the unit they have.
+    **Units**: those of the channel map, otherwise those of the file (Parquet: the field's metadata `unit`; MDF4: the channel's
+    unit; MATLAB: `Units` beside the data; CSV and Parquet: `name [unit]` in the first line), otherwise SI. Channels of
+    `io.CANONICAL` are converted to SI; other channels keep their unit.
 
     **Time base**: MDF4 groups, MATLAB structs and MCAP topics of different rasters are merged, not resampled: a row for every
-    stamp, NaN where a sensor did not speak. Stamps keep the log's own time, in seconds, on the host in float64; channels have
-    JAX's float type.
+    time stamp, NaN where a sensor has no sample. Time stamps keep the log's own time, in seconds, on the host in float64;
+    channels have JAX's float type.
 
-    **Raises** `InputError` naming file, column, row, value and what to do: no such file or suffix, a broken file, an
+    **Raises** `InputError` naming file, column, row, value and remedy: a missing file, an unknown suffix, a broken file, an
     empty log, an unknown column, a unit of another dimension, a cell that is not a number, time that does not increase.
     """
     return _read(path, channels, raster, method, as_saved=False)
 
 
 def load_recording(path: str | os.PathLike) -> Recording:
-    """As `read_recording`; a file that a recording was saved in gives the float types of its channels back, too."""
+    """Read a log like `read_recording`; in a file saved from a recording the channels keep their float types."""
     return _read(path, None, None, "linear", as_saved=True)
 
 
@@ -94,14 +94,14 @@ def _read(
     with contextlib.closing(_OPEN[suffix](path, chosen)) as log:
         wanted = chosen.channels if chosen else {name: Channel(name) for name in log.names}
         if not wanted:
-            raise InputError(f"{path}: holds no channel beside time.")
+            raise InputError(f"{path}: has no channel except time.")
         as_saved = as_saved and log.as_saved
         load = (lambda name, channel: log.column(name)) if as_saved else lambda name, channel: _load(log, name, channel)
         loaded = {name: load(name, channel) for name, channel in wanted.items()}
         note = log.note if as_saved else log.note or path.name
     time, values = merge(loaded)
     if as_saved:
-        # A recording leaves arrays of jax as they are; those of NumPy get the float type of today.
+        # A recording leaves arrays of JAX unchanged; those of NumPy get JAX's current float type.
         values = {name: jnp.asarray(one) for name, one in values.items()}
     units = {name: column.unit for name, column in loaded.items() if column.unit}
     try:
@@ -112,13 +112,13 @@ def _read(
 
 
 def write_recording(recording: Recording, path: str | os.PathLike, *, overwrite: bool = False) -> None:
-    """Write a recording as `.csv`, `.parquet`, `.mf4`, `.mdf` or `.nc`; `read_recording` gives it back.
+    """Write a recording as `.csv`, `.parquet`, `.mf4`, `.mdf` or `.nc`, which `read_recording` reads back.
 
-    Values and time come back bit for bit from every format; units and source note from Parquet, MDF4 and NetCDF. CSV has no
-    place for them: where units are not SI, or for other readers, write `with_units_in_names(recording)`. `Recording.load` gives
-    the channels of Parquet and NetCDF the float types back that they had.
+    Every format keeps values and time bit for bit; Parquet, MDF4 and NetCDF keep units and source note. CSV has no place for
+    them: if units are not SI, or for other readers, write `with_units_in_names(recording)`. `Recording.load` restores the float
+    types of channels from Parquet and NetCDF.
 
-    The file appears as a whole or not at all. **Raises** `InputError` for another suffix, or where the file exists and
+    The file is written completely or not at all. **Raises** `InputError` for another suffix, or if the file exists and
     `overwrite` is False.
     """
     columns = {name: np.asarray(values) for name, values in recording.channels.items()}
@@ -126,7 +126,7 @@ def write_recording(recording: Recording, path: str | os.PathLike, *, overwrite:
 
 
 def with_units_in_names(recording: Recording) -> Recording:
-    """A copy whose channels are named `name [unit]`, for CSV files that other programs read; reading strips them."""
+    """Return a copy whose channels are named `name [unit]`, for CSV files for other programs; reading removes the units."""
     units = {name: recording.unit(name) for name in recording.names}
     names = {name: f"{name} [{unit}]" if is_unit(unit) else name for name, unit in units.items()}
     channels = {names[name]: values for name, values in recording.channels.items()}
@@ -142,7 +142,7 @@ def write_columns(
     note: str,
     overwrite: bool,
 ) -> None:
-    """Write columns (T,) over `time` (T,) in the format of the suffix, all or nothing."""
+    """Write columns (T,) over `time` (T,) in the format of the suffix, completely or not at all."""
     path = Path(path)
     suffix = check_suffix(path, _WRITE, "recording")
     if "time" in columns:

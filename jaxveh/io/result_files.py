@@ -1,4 +1,4 @@
-"""Results in files: NetCDF through xarray, and Parquet through pyarrow; each gives back what was written, to the last bit."""
+"""Results in files: NetCDF through xarray, and Parquet through pyarrow; both keep all values to the last bit."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from jaxveh.io.wide_parquet import read_wide, write_wide
 _READ: dict[str, Callable[[Path], Labelled]] = {".nc": read_netcdf, ".parquet": read_wide}
 _WRITE: dict[str, Callable[[Path, Labelled], None]] = {".nc": write_netcdf, ".parquet": write_wide}
 RESULT_SUFFIXES = tuple(_WRITE)
-"""Endings of files that keep a whole result."""
+"""Endings of files that can contain a whole result."""
 
 
 def save_result(result: Any, path: str | os.PathLike, overwrite: bool = False) -> None:
-    """Write a result as `.nc` or `.parquet`, all or nothing; a recording in any format of `write_recording`."""
+    """Write a result as `.nc` or `.parquet`, completely or not at all; a recording in any format of `write_recording`."""
     path = Path(path)
     if isinstance(result, Recording) and result.time.ndim == 1:
         write_recording(result, path, overwrite=overwrite)
@@ -33,7 +33,7 @@ def save_result(result: Any, path: str | os.PathLike, overwrite: bool = False) -
 
 
 def load_result(kind: type, path: str | os.PathLike) -> Any:
-    """The result of a kind that `save_result` wrote; a recording of any log that `read_recording` reads."""
+    """Read a result of a kind that `save_result` wrote; a recording from any log that `read_recording` reads."""
     path = Path(path)
     if kind is Recording and path.suffix.lower() not in _READ:
         return load_recording(path)

@@ -1,4 +1,4 @@
-"""How rig data are shown and kept."""
+"""Display and storage of rig data."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jaxveh._core.shown import Kept
 
 
 class RigShown(Kept):
-    """A table with arrays (n,) by name, of these `units`, and a `source`."""
+    """A table with arrays (n,) by name, in these `units`, and a `source`."""
 
     __slots__ = ()
 
@@ -20,7 +20,7 @@ class RigShown(Kept):
     units: ClassVar[dict[str, str]] = {}
 
     def to_pandas(self) -> Any:
-        """A `pandas.DataFrame` with a row a row, and a column for each array that is there; units in `frame.attrs["units"]`."""
+        """Return a `pandas.DataFrame` with the rows of the table and a column per array; units are in `frame.attrs["units"]`."""
         return super().to_pandas()
 
     def _arrays(self) -> dict[str, np.ndarray]:

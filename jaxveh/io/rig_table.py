@@ -1,4 +1,4 @@
-"""Rig data: what a tyre did on a test rig, row by row."""
+"""Rig data: the measurements of a tyre on a test rig, row by row."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ COLUMNS = {
     "M_z": (("Mz", "M_z"), "N*m"),
     "run": (("run",), "dimensionless"),
 }
-"""Names of a CSV file's columns, the first that is there counts, and the unit that is meant where a name carries none."""
+"""Names of the columns of a CSV file (the first that is present counts), and the unit of a name without one."""
 
 LARGEST = {"slip_angle": 1.0, "camber": 1.2}
-"""Angles (rad) beyond which numbers without a unit are taken for degrees: 57 degrees of slip, 69 of camber."""
+"""Angles (rad) beyond which numbers without a unit are assumed to be degrees: 57 degrees of slip, 69 of camber."""
 
 RIGHT_ANGLE = np.pi / 2
 
@@ -54,10 +54,10 @@ class RigTable(RigShown):
     """Measurements of a tyre; float arrays (n,) in SI units and this package's axes (x forward, y left, z up).
 
     Inputs: `slip_angle` (rad, a positive one gives a positive force), `slip_ratio` (-), `load` (N); `camber` (rad), `speed`
-    (m/s) and `pressure` (Pa) are None where nobody told. Measured: `F_x`, `F_y` (N), `M_x`, `M_y`, `M_z` (N m) at the contact
-    patch, None where the rig has none, NaN where a value is missing. `run` (n,) numbers the sweep that a row belongs to.
+    (m/s) and `pressure` (Pa) are None if unknown. Measurements: `F_x`, `F_y` (N), `M_x`, `M_y`, `M_z` (N m) at the contact
+    patch, None if not measured, NaN where a value is missing. `run` (n,) is the number of the sweep that a row belongs to.
 
-    **Raises** `InputError` for arrays of several lengths, an input that is not finite, a load that points down, a negative
+    **Raises** `InputError` for arrays of different lengths, an input that is not finite, a load that points down, a negative
     speed, a pressure that is not positive, and a table without a measurement.
     """
 
@@ -90,14 +90,14 @@ class RigTable(RigShown):
             self._check_rows(name, lambda v: ~np.isinf(v), "must be finite, or NaN where nothing was measured")
         if np.median(self.load) <= 0:
             raise InputError(
-                f"{self.source}: load = {np.median(self.load):g} in the median: a wheel's load is positive here, as in ISO-W and "
-                "TYDEX, where z points up; SAE's FZ is negative: axes = 'sae' (--axes sae)."
+                f"{self.source}: the median load is {np.median(self.load):g}: it must be positive, as in ISO-W and "
+                "TYDEX, where z points up; for SAE's axes, where FZ is negative, give axes = 'sae' (--axes sae)."
             )
         for name in LARGEST:
             self._check_rows(
                 name, lambda v: np.abs(v) <= RIGHT_ANGLE, "must be radians within a right angle: degrees? (np.radians)"
             )
-        self._check_rows("speed", lambda v: v >= 0, "must be at least 0: turn the wheel's axes instead")
+        self._check_rows("speed", lambda v: v >= 0, "must be at least 0: turn the axes of the wheel instead")
         self._check_rows("pressure", lambda v: v > 0, "must be positive (Pa)")
 
     def _check_shapes(self) -> None:
@@ -105,7 +105,7 @@ class RigTable(RigShown):
         if any(len(shape) != 1 or shape != shapes["load"] for shape in shapes.values()):
             raise InputError(f"{self.source}: shapes {shapes}: must all be (n,).")
         if shapes["load"] == (0,):
-            raise InputError(f"{self.source}: holds no row.")
+            raise InputError(f"{self.source}: has no rows.")
         if not any(np.isfinite(getattr(self, name)).any() for name in RIG_CHANNELS if name in shapes):
             raise InputError(f"{self.source}: no measurement: one of {', '.join(RIG_CHANNELS)} is needed.")
 
@@ -116,7 +116,7 @@ class RigTable(RigShown):
             raise InputError(f"{self.source}: {name} = {values[row]:g} in row {row}: {allowed}.")
 
     def take(self, rows: np.ndarray) -> RigTable:
-        """The table of some rows: indices, or a mask (n,)."""
+        """Return the table of some `rows`: indices, or a mask (n,)."""
         return dataclasses.replace(
             self, **{name: values[rows] for name in COLUMNS if (values := getattr(self, name)) is not None}
         )
@@ -125,20 +125,20 @@ class RigTable(RigShown):
 def read_rig_table(
     path: str | Path | Sequence[str | Path], axes: str | None = None, *, measured: Sequence[str] = RIG_CHANNELS
 ) -> RigTable:
-    """Read rig data; several files are joined, each one its run. What a file is, its suffix and its columns tell:
+    """Read rig data; several files are joined, each as a run. The kind of a file follows from its suffix and its columns:
 
-    - CSV with one header line, columns by the names of `COLUMNS` in SI units, or with a unit in the name (`alpha [deg]`); slips
-      that a file does not have are zero; an empty cell is a missing measurement.
-    - The Formula SAE Tire Test Consortium's (`.dat`, `.txt`, `.mat`, and a `.csv` with its names): see `ttc.read_ttc`.
+    - CSV with one header line, with the names of `COLUMNS` in SI units, or with a unit in the name (`alpha [deg]`); missing slips
+      are zero; an empty cell is a missing measurement.
+    - Files of the Formula SAE Tire Test Consortium (`.dat`, `.txt`, `.mat`, and a `.csv` with its names): see `ttc.read_ttc`.
     - TYDEX (`.tdx`, `.tyd`, `.tydex`): see `tydex.read_tydex`.
 
-    `axes`: the signs of the file, one of `rig_axes.AXES`, for whatever file. By default those that its kind has: ISO-W for
-    CSV and TYDEX (a positive slip angle gives a negative force), SAE for the consortium's, where FZ is negative. `measured`:
-    which forces and moments to read.
+    `axes`: the sign convention of the file, one of `rig_axes.AXES`. The default depends on the kind: ISO-W for CSV and TYDEX (a
+    positive slip angle gives a negative force), SAE for the consortium's files, where FZ is negative. `measured`: the forces
+    and moments to read.
 
-    **Raises** `InputError` as `RigTable`, `read_ttc` and `read_tydex`, for unknown axes, for angles without a unit that must be
-    degrees, for the consortium's files whose FZ is not SAE's and whose axes nobody told, and for files that do not tell the
-    same inputs.
+    **Raises** `InputError` like `RigTable`, `read_ttc` and `read_tydex`, for unknown axes, for angles without a unit that must be
+    degrees, for the consortium's files if FZ is not negative as in SAE's axes and `axes` is not given, and for files with
+    different inputs.
     """
     if axes is not None:
         check_one_of("axes", axes, AXES)
@@ -152,9 +152,9 @@ def read_rig_table(
 
 
 def join(tables: Sequence[RigTable]) -> RigTable:
-    """One table of several, each one its run, or as many as it has; what only some of them measured is NaN in the others.
+    """Join several tables; each is a run, or keeps its own runs. A quantity that only some of them measured is NaN in the others.
 
-    **Raises** `InputError` where only some of them tell of an input.
+    **Raises** `InputError` if only some of them have an input.
     """
     joined: dict[str, np.ndarray | None] = {}
     for name in (*INPUTS, *RIG_CHANNELS):
@@ -162,7 +162,9 @@ def join(tables: Sequence[RigTable]) -> RigTable:
         having = [part is not None for part in parts]
         if name in INPUTS and any(having) and not all(having):
             without = tables[having.index(False)].source
-            raise InputError(f"{without}: has no {name}, which other files have: add it there, or read them apart.")
+            raise InputError(
+                f"{without}: has no {name}, which other files have: add it there, or read the files separately."
+            )
         filled = [np.full(table.load.shape, np.nan) if p is None else p for p, table in zip(parts, tables, strict=True)]
         joined[name] = np.concatenate(filled) if any(having) else None
     runs, first = [], 0.0
@@ -188,11 +190,11 @@ def _read(path: Path, axes: str | None, measured: tuple[str, ...]) -> RigTable:
 
 
 def _ttc_axes(path: Path, load: np.ndarray) -> str:
-    """SAE, which the consortium's files are in unless somebody turned them."""
+    """Return SAE's axes, the usual ones of the consortium's files, after a check of the sign of FZ."""
     if load.size and np.nanmedian(load) > 0:
         raise InputError(
-            f"{path}: FZ = {np.nanmedian(load):g} N in the median: it is negative in SAE's axes, in which the FSAE TTC's files "
-            "are; tell in which these were written: axes = 'adapted-sae' or 'iso-w' (--axes)."
+            f"{path}: the median FZ is {np.nanmedian(load):g} N, but it is negative in SAE's axes, the usual axes of the FSAE "
+            "TTC's files; give the axes of this file: axes = 'adapted-sae' or 'iso-w' (--axes)."
         )
     return "sae"
 
@@ -217,20 +219,20 @@ def _read_csv(path: Path, measured: tuple[str, ...]) -> dict[str, np.ndarray | N
         raise InputError(f"{path}: no slip among the columns {', '.join(columns)}: in_alpha or in_kappa is needed.")
     zero = np.zeros(len(np.asarray(found["load"])))
     found = {"slip_angle": zero, "slip_ratio": zero, **found}
-    # For the reference evaluator a pressure of zero is the nominal one.
+    # In the reference evaluator a pressure of zero means the nominal pressure.
     if found.get("pressure") is not None and not np.any(found["pressure"]):
         del found["pressure"]
     return found
 
 
 def _refuse_degrees(path: Path, field: str, name: str, values: np.ndarray) -> None:
-    """Raise where angles that name no unit are too large for radians."""
+    """Raise `InputError` if angles without a unit are too large for radians."""
     if field not in LARGEST or not np.any(np.abs(values) > LARGEST[field]):
         return
     size = np.nanmax(np.abs(values))
     raise InputError(
-        f"{path}: {name} goes to {size:.4g} and names no unit, which means radians, {np.degrees(size):.0f} degrees: if these are "
-        f"degrees, name the column '{name} [deg]', if they are not, '{name} [rad]'."
+        f"{path}: {name} goes to {size:.4g} without a unit, which would be radians, {np.degrees(size):.0f} degrees: if these are "
+        f"degrees, name the column '{name} [deg]', otherwise '{name} [rad]'."
     )
 
 

@@ -1,4 +1,4 @@
-"""One file that describes a road: TOML in SI units, tables over distance, checked key by key."""
+"""The file that describes a road: TOML in SI units, tables over distance, checked key by key."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml
 
 ROAD_SCHEMA = """\
 # A road along the x axis. SI units; y left, z up.
-# Each table has a value for each distance and is held before the first and after the last. One number instead of a
-# table holds for all the way.
-distance = [0.0, 100.0, 200.0]  # m, rising; may be left out where all else is one number
-friction = [1.0, 1.0, 0.4]      # over that of the road on which the tyres were measured; default 1
+# Each table has one value per distance; the first and last values hold beyond the ends. A single number instead of a
+# table holds for the whole road.
+distance = [0.0, 100.0, 200.0]  # m, increasing; may be omitted if everything else is a single number
+friction = [1.0, 1.0, 0.4]      # relative to the road on which the tyres were measured; default 1
 
 # All that follows is optional.
 name = "wet hill"
@@ -26,7 +26,7 @@ grade = [0.0, 0.05, 0.0]        # rad, uphill positive; default 0
 bank = 0.02                     # rad, left side higher positive; default 0
 interpolation = "smooth"        # between the points: "smooth" (monotone cubics) or "linear"
 """
-"""The file's schema as a commented example that reads, for programs to print."""
+"""The file's schema as a commented, valid example, for programs to print."""
 
 _RANGES = {
     "distance": (-1e6, 1e6, " m"),
@@ -38,9 +38,9 @@ _RANGES = {
 
 @dataclass(frozen=True)
 class RoadSpecification:
-    """What a road file says: numbers, or tuples over `distance`, in SI units. See `road.ROAD_SCHEMA`.
+    """The contents of a road file: numbers, or tuples over `distance`, in SI units. See `road.ROAD_SCHEMA`.
 
-    **Raises** `InputError` with name, value and allowed range for distances that do not rise, tables of another
+    **Raises** `InputError` with name, value and allowed range for distances that do not increase, tables of another
     length, and values that no road has.
     """
 
@@ -67,7 +67,7 @@ class RoadSpecification:
             if not isinstance(self.distance, tuple) or len(self.distance) < 2:
                 raise InputError(f"distance = {self.distance}: must be a list of at least two distances.")
             if not np.all(np.diff(self.distance) > 0):
-                raise InputError(f"distance = {list(self.distance)}: must rise from point to point.")
+                raise InputError(f"distance = {list(self.distance)}: must increase from point to point.")
         for key in ("friction", "grade", "bank"):
             value = getattr(self, key)
             if not isinstance(value, tuple):
@@ -81,7 +81,7 @@ class RoadSpecification:
 def read_road(path: str | os.PathLike) -> RoadSpecification:
     """Read a road from TOML (`road.ROAD_SCHEMA`).
 
-    **Raises** `InputError` naming the file and: the line of broken TOML, a key that is unknown (with the near ones), or
+    **Raises** `InputError` naming the file and: the line of broken TOML, an unknown key (with similar ones), or
     a value with its allowed range.
     """
     path = Path(path)
@@ -96,7 +96,7 @@ def read_road(path: str | os.PathLike) -> RoadSpecification:
 def write_road(road: RoadSpecification, path: str | os.PathLike, *, note: str = "", overwrite: bool = False) -> None:
     """Write a road as TOML that `read_road` reads back bit for bit; `note` becomes comment lines at the top.
 
-    The file appears as a whole or not at all. **Raises** `InputError` where it exists and `overwrite` is False.
+    The file is written completely or not at all. **Raises** `InputError` if it exists and `overwrite` is False.
     """
     lines = [f"# {line}".rstrip() for line in note.splitlines()]
     for entry in fields(road):

@@ -1,4 +1,4 @@
-"""From the steering wheel to the road wheels, and for whom the rear ones must not turn."""
+"""The steer at the road wheels from that of the steering wheel, and a check that the rear wheels are not steered."""
 
 from __future__ import annotations
 
@@ -10,18 +10,21 @@ from jaxveh.io.car import CarSpecification
 
 
 def with_road_steer(car: CarSpecification, recording: Recording) -> Recording:
-    """The recording with `steer` (rad, at the road wheels): its own, else `steering_wheel` over the `steering_ratio` of the car's
-    file; as it is where neither is known."""
+    """Return the recording with `steer` (rad, at the road wheels).
+
+    If `recording` has none, it is `steering_wheel` over the `steering_ratio` of `car`. The recording is unchanged if it has
+    `steer`, or if one of the two is missing.
+    """
     if "steer" in recording or "steering_wheel" not in recording or car.steering_ratio is None:
         return recording
     return recording.replace(steer=np.asarray(recording["steering_wheel"]) / car.steering_ratio)
 
 
 def check_front_steered(car: CarSpecification, who: str) -> None:
-    """Raise `InputError` for a car whose rear wheels are steered, which is not in the equations of `who` asks."""
+    """Raise `InputError` if the rear wheels of `car` are steered, because the equations of `who` do not include that."""
     if not car.steers_front_alone:
         raise InputError(
-            f'{who}: the car\'s file says steering = "{car.steering}": its equations are those of a car whose front wheels alone '
-            "are steered. Make the vehicle (vehicles.specified_car) and a filter on it (estimators.state_space), which know the "
-            "rear wheels' angles, or leave the steering out of the file where they stay straight."
+            f'{who}: the car\'s file has steering = "{car.steering}", but the equations used here hold only for a car with '
+            "front steering. Make the vehicle (vehicles.specified_car) and a filter for it (estimators.state_space), which "
+            "include the angles of the rear wheels, or leave the steering out of the file if the rear wheels stay straight."
         )

@@ -1,6 +1,6 @@
-"""Rig data in the form of the Formula SAE Tire Test Consortium (FSAE TTC), as Calspan's flat-belt machine writes them.
+"""Rig data in the format of the Formula SAE Tire Test Consortium (FSAE TTC), as Calspan's flat-belt machine writes them.
 
-Text (`.dat`, `.csv`, `.txt`): a line that tells of the test, a line of names, a line of units, then rows, split by tabs. MATLAB's
+Text (`.dat`, `.csv`, `.txt`): a line about the test, a line of names, a line of units, then rows, separated by tabs. MATLAB's
 `.mat`: a vector for each name, and a struct `channel` with `name` and `units`. The names are the consortium's:
 `SA` and `IA` (deg) slip and inclination angle, `SL` the slip ratio to the effective radius, `FX`, `FY`, `FZ` (N), `MX`, `MZ`
 (N m), `P` (kPa), `V` (km/h); in US customary units lb, ft-lb, psi, mph. Axes are SAE's, so that FZ of a loaded wheel is negative.
@@ -26,7 +26,7 @@ from jaxveh.io.mat_file import read_mat
 from jaxveh.io.naming import listing
 
 SUFFIXES = (".dat", ".txt", ".mat")
-"""Of files that are read as the consortium's; a `.csv` is, where its names are."""
+"""Endings of files that are read as the consortium's; a `.csv` is too if it has the consortium's names."""
 
 LBF, FOOT, INCH = 4.4482216152605, 0.3048, 0.0254
 
@@ -39,7 +39,7 @@ UNITS = {
     "speed": {"kph": 1 / 3.6, "km/h": 1 / 3.6, "kmh": 1 / 3.6, "m/s": 1.0, "mph": 0.44704},
     "number": {},
 }  # fmt: skip
-"""Units by quantity, capitals or not, and their size in SI."""
+"""Units by quantity, in any case, and their size in SI."""
 
 METRIC = {
     "angle": "deg",
@@ -50,7 +50,7 @@ METRIC = {
     "speed": "kph",
     "number": "",
 }
-"""What is meant where a file names no units: the consortium's metric ones."""
+"""The units of a file that names none: the consortium's metric ones."""
 
 COLUMNS = {
     "slip_angle": ("SA", "angle"),
@@ -66,18 +66,21 @@ COLUMNS = {
     "M_z": ("MZ", "moment"),
     "run": ("RUN", "number"),
 }
-"""Fields of a `RigTable`, the name of their column and what it measures."""
+"""Fields of a `RigTable`, with the name of their column and its quantity."""
 
 HEADER_LINES = 10
-"""Lines from the top among which the names must be."""
+"""The line of names must be among this many first lines."""
 
 FREE = 0.03
-"""How far SR may vary (2nd to 98th percentile) on a wheel that rolls freely."""
+"""Largest variation of SR (2nd to 98th percentile) of a freely rolling wheel."""
 
 
 class TtcTable(NamedTuple):
-    """A file of the consortium: `columns` (n,) by field of a `RigTable`, in SI units and in the signs that the file has; `title`,
-    its first line or the tyre's name; `source`, its path."""
+    """A file of the consortium.
+
+    `columns`: (n,) by field of a `RigTable`, in SI units and with the signs of the file; `title`: its first line or the tyre's
+    name; `source`: its path.
+    """
 
     columns: dict[str, np.ndarray]
     title: str
@@ -85,7 +88,10 @@ class TtcTable(NamedTuple):
 
 
 class _Cells(NamedTuple):
-    """Columns as a file has them: by name in capitals, a function that gives the values (n,); `units` of those that have one."""
+    """The columns of a file.
+
+    `load`: functions that return the values (n,), by name in capitals; `units`: the units, for columns that have one.
+    """
 
     load: dict[str, Callable[[], np.ndarray]]
     units: dict[str, str]
@@ -93,13 +99,13 @@ class _Cells(NamedTuple):
 
 
 def is_ttc(names: Iterable[str]) -> bool:
-    """Whether these are the consortium's names: a load `FZ` and a slip `SA` or `SL`, capitals or not, with a unit or without."""
+    """Whether these are the consortium's names: a load `FZ` and a slip `SA` or `SL`, in any case, with or without a unit."""
     known = {split_unit(name)[0].upper() for name in names}
     return "FZ" in known and not known.isdisjoint(("SA", "SL"))
 
 
 def names_line(path: Path) -> tuple[int, list[str], str] | None:
-    """The line (from 0) of a text file that holds the consortium's names, the names and what splits them; None without one."""
+    """Find the line with the consortium's names in a text file: its number from 0, the names, their separator; None if absent."""
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         for number, line in zip(range(HEADER_LINES), file, strict=False):
             splitter = max(("\t", ",", ";"), key=line.count)
@@ -112,12 +118,11 @@ def names_line(path: Path) -> tuple[int, list[str], str] | None:
 def read_ttc(path: str | Path) -> TtcTable:
     """Read a file of the consortium: text, or a MATLAB file.
 
-    Units are those that the file names; metric ones, as the consortium has them, where it names none. A slip that is not there is
-    zero: `SR` refers to the loaded radius, and its zero is no free rolling.
+    The file's own units are used, and the consortium's metric units if it names none. A missing slip is taken as zero. `SR` is
+    not used as slip ratio: it refers to the loaded radius, so that it is not zero in free rolling.
 
     **Raises** `InputError`, naming the file and the column, for a file without `FZ`, or with neither `SA` nor `SL`; for
-    units that are not known, cells that are no numbers, columns of several lengths, and an `SR` that is swept without
-    an `SL`.
+    unknown units, cells that are not numbers, columns of different lengths, and an `SR` that is swept without an `SL`.
     """
     path = Path(path)
     check_readable(path)
@@ -129,7 +134,7 @@ def read_ttc(path: str | Path) -> TtcTable:
     }
     lengths = {COLUMNS[field][0]: len(values) for field, values in columns.items()}
     if len(set(lengths.values())) > 1:
-        raise InputError(f"{path}: columns of several lengths: {lengths}.")
+        raise InputError(f"{path}: columns of different lengths: {lengths}.")
     if "slip_ratio" not in columns and "SR" in cells.load:
         _refuse_swept(cells.load["SR"](), path)
     zero = np.zeros(len(columns["load"]))
@@ -143,7 +148,7 @@ def _in_si(cells: _Cells, name: str, quantity: str, path: Path) -> np.ndarray:
     unit, known = cells.units.get(name, METRIC[quantity]).strip(), UNITS[quantity]
     if unit.casefold() not in known:
         units = ", ".join(one or "nothing" for one in known)
-        raise InputError(f"{path}: {name}: unit {unit!r}: must be one of {units}, capitals or not.")
+        raise InputError(f"{path}: {name}: unit {unit!r}: must be one of {units}, in any case.")
     return values * known[unit.casefold()]
 
 
@@ -151,7 +156,7 @@ def _refuse_swept(ratio: np.ndarray, path: Path) -> None:
     low, high = np.nanpercentile(ratio, [2, 98])
     if high - low > FREE:
         raise InputError(
-            f"{path}: no SL, and SR goes from {low:.3g} to {high:.3g}: SR refers to the loaded radius, so that it is no slip "
+            f"{path}: no SL, and SR goes from {low:.3g} to {high:.3g}: SR refers to the loaded radius, so it is not the slip "
             "ratio; compute SL = RE N / V - 1 (RE in m, N in rad/s, V in m/s)."
         )
 
@@ -167,14 +172,14 @@ def _text(path: Path) -> _Cells:
     found = names_line(path)
     if found is None:
         raise InputError(
-            f"{path}: no line with the names FZ and SA or SL among the first {HEADER_LINES}: these are no columns of "
+            f"{path}: no line with the names FZ and SA or SL among the first {HEADER_LINES}: this is not a file of "
             "the FSAE TTC."
         )
     number, headings, separator = found
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         lines = [line for line, _ in zip(file, range(number + 2), strict=False)]
     below = _split(lines[number + 1], separator) if len(lines) > number + 1 else []
-    # A line of data may lack a cell, a line of units may call a ratio's unit 1.
+    # A line of data may have an empty cell, and a line of units may name the unit of a ratio 1.
     rows_begin = sum(map(is_number, below)) > len(below) / 2
     units = {} if rows_begin else dict(zip((heading.upper() for heading in headings), below, strict=False))
     _check_unique(headings, path)
@@ -207,7 +212,7 @@ def _matlab(path: Path) -> _Cells:
 
 
 def _strings(cells: Any) -> list[str]:
-    """The texts of a MATLAB cell array, however deeply they are wrapped."""
+    """Return the texts of a MATLAB cell array of any nesting."""
     if isinstance(cells, list | tuple):
         return [text for cell in cells for text in _strings(cell)]
     return [cells] if isinstance(cells, str) else []
@@ -215,5 +220,5 @@ def _strings(cells: Any) -> list[str]:
 
 def _vector(values: np.ndarray, name: str, path: Path) -> np.ndarray:
     if max(values.shape, default=0) != values.size or values.dtype.kind not in "fiu":
-        raise InputError(f"{path}: {name}: must be a vector of numbers, is {values.dtype} of shape {values.shape}.")
+        raise InputError(f"{path}: {name}: must be a vector of numbers, but is {values.dtype} of shape {values.shape}.")
     return values.ravel().astype(np.float64)

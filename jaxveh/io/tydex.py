@@ -1,7 +1,7 @@
-"""TYDEX files: what tyre test rigs write.
+"""TYDEX files, the output of tyre test rigs.
 
 The format is that of H.-J. Unrau and J. Zamow, TYDEX-Format, Description and Reference Manual, release 1.3 (1997): sections
-that begin with `**NAME`, comment lines that begin with `!`, fixed columns of a name (10 characters), a description (30), a
+that begin with `**NAME`, comment lines that begin with `!`, fixed columns for a name (10 characters), a description (30), a
 unit (10) and values (10 each).
 """
 
@@ -18,7 +18,7 @@ from jaxveh.io.files import check_readable
 from jaxveh.io.toml import shorten
 
 MISSING = ("NOTAVAIL", "NAN")
-"""What stands in place of a number that was not measured."""
+"""Texts in the place of a number that was not measured."""
 
 _NAME, _UNIT, _VALUES, _WIDTH = slice(0, 10), slice(40, 50), 50, 10
 
@@ -27,7 +27,7 @@ _NAME, _UNIT, _VALUES, _WIDTH = slice(0, 10), slice(40, 50), 50, 10
 class TydexChannel:
     """One quantity of a TYDEX file: physical `values` (n,), or a float for a constant, in `unit`; its `line` from 1.
 
-    A constant that is no number (the name of a road) is a text.
+    A constant that is not a number (the name of a road) is a text.
     """
 
     name: str
@@ -38,7 +38,7 @@ class TydexChannel:
 
 @dataclass(frozen=True, eq=False)
 class TydexFile:
-    """A TYDEX file: `header` and `comments` as they stand, `constants` and measured `channels` by name."""
+    """A TYDEX file: `header` and `comments` unchanged, `constants` and measured `channels` by name."""
 
     source: str
     header: dict[str, str]
@@ -47,7 +47,7 @@ class TydexFile:
     channels: dict[str, TydexChannel]
 
     def find(self, name: str) -> TydexChannel | None:
-        """The channel of that name, else the constant; None where there is neither."""
+        """Return the channel of that name, otherwise the constant; None if there is neither."""
         return self.channels.get(name, self.constants.get(name))
 
 
@@ -64,14 +64,14 @@ class _Conversion:
 
 
 def read_tydex(path: str | Path) -> TydexFile:
-    """Read a TYDEX file; each channel comes as `factor (raw + offset of the raw value) + offset of the physical value`.
+    """Read a TYDEX file; each channel is `factor (raw + offset of the raw value) + offset of the physical value`.
 
-    **Raises** `InputError`, with the line, for a file without **MEASURCHANNELS or **MEASURDATA, a channel that stands twice, a
-    row with another number of columns than there are channels, and a cell that is no number (`NOTAVAIL` is a missing one).
+    **Raises** `InputError`, with the line, for a file without **MEASURCHANNELS or **MEASURDATA, a channel that occurs twice, a
+    row with another number of columns than there are channels, and a cell that is not a number (`NOTAVAIL` is a missing one).
     """
     path = Path(path)
     check_readable(path)
-    # Descriptions and comments may hold bytes that are no UTF-8 (a degree sign).
+    # Descriptions and comments may contain bytes that are not UTF-8 (a degree sign).
     return parse_tydex(path.read_text(encoding="utf-8", errors="replace"), str(path))
 
 
@@ -80,7 +80,7 @@ def parse_tydex(text: str, source: str = "TYDEX file") -> TydexFile:
     sections = _sections(text)
     for needed in ("MEASURCHANNELS", "MEASURDATA"):
         if not sections.get(needed):
-            raise InputError(f"{source}: no section **{needed} with lines: this holds no measurement in TYDEX format.")
+            raise InputError(f"{source}: no section **{needed} with lines: there are no measurements in TYDEX format.")
     conversions = [_conversion(line, number, source) for number, line in sections["MEASURCHANNELS"]]
     _check_unique(conversions, source)
     rows = [_row(line, number, len(conversions), source) for number, line in sections["MEASURDATA"]]
@@ -95,7 +95,7 @@ def parse_tydex(text: str, source: str = "TYDEX file") -> TydexFile:
 
 
 def _sections(text: str) -> dict[str, list[tuple[int, str]]]:
-    """Lines with their numbers by section; blank and comment lines are left out, and what follows **END."""
+    """Return lines with their numbers by section, without blank lines, comment lines and lines after **END."""
     found: dict[str, list[tuple[int, str]]] = {}
     section = ""
     for number, line in enumerate(text.splitlines(), start=1):
@@ -117,7 +117,7 @@ def _conversion(line: str, number: int, source: str) -> _Conversion:
     if len(factors) > 3 or not np.isfinite(factors).all():
         raise InputError(
             f"{source}, line {number}: {name}: conversion {line[_VALUES:].strip()!r}: must be a factor and two offsets "
-            "in columns 51, 61 and 71 (the name stands in column 1, the unit in column 41)."
+            "in columns 51, 61 and 71 (the name begins in column 1, the unit in column 41)."
         )
     factor, before, after = [*factors, *(1.0, 0.0, 0.0)[len(factors) :]]
     if factor == 0:
@@ -129,7 +129,9 @@ def _check_unique(conversions: list[_Conversion], source: str) -> None:
     first: dict[str, int] = {}
     for c in conversions:
         if c.name in first:
-            raise InputError(f"{source}: channel {c.name} stands twice, lines {first[c.name]} and {c.line}: leave one.")
+            raise InputError(
+                f"{source}: channel {c.name} occurs twice, in lines {first[c.name]} and {c.line}: keep one."
+            )
         first[c.name] = c.line
 
 
@@ -143,7 +145,7 @@ def _row(line: str, number: int, channels: int, source: str) -> list[float]:
 
 
 def _cells(text: str, wanted: int) -> list[str]:
-    """Cells between blanks; where they touch each other (`-1234.5678-1234.5678`), those of ten characters."""
+    """Split a text into cells at blanks; if cells touch each other (`-1234.5678-1234.5678`), into cells of ten characters."""
     cells = text.split()
     if len(cells) >= wanted or len(text) <= _WIDTH * (wanted - 1):
         return cells
@@ -157,7 +159,7 @@ def _number(cell: str, line: int, source: str) -> float:
         return decimal(cell)
     except ValueError:
         raise InputError(
-            f"{source}, line {line}: {shorten(cell)} is not a number ({MISSING[0]} is a missing one)."
+            f"{source}, line {line}: {shorten(cell)} is not a number (write {MISSING[0]} for a missing one)."
         ) from None
 
 

@@ -1,8 +1,8 @@
-"""From the channels of a TYDEX file to slips, forces and moments at the contact patch, in SI units and ISO-W's signs.
+"""Conversion of the channels of a TYDEX file to slips, forces and moments at the contact patch, in SI units with ISO-W's signs.
 
-TYDEX knows three axes, all with z up (Unrau & Zamow 1997, section 2.6): W at the contact point, H at the wheel's centre with
-the same directions, C at the centre and inclined with the wheel. With the loaded radius R and the inclination angle gamma the
-centre is `R (0, -sin gamma, cos gamma)` away from the contact point.
+TYDEX has three axis systems, all with z up (Unrau & Zamow 1997, section 2.6): W at the contact point, H at the wheel's centre
+with the same directions, C at the centre and inclined with the wheel. With the loaded radius R and the inclination angle gamma,
+the vector from the contact point to the centre is `R (0, -sin gamma, cos gamma)`.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ UNITS = {
     "pressure": {"pa": 1.0, "hpa": 1e2, "kpa": 1e3, "mpa": 1e6, "bar": 1e5, "mbar": 1e2},
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
 }
-"""Units by quantity, capitals or not, and their size in SI."""
+"""Units by quantity, in any case, and their size in SI."""
 
 
 def contact_patch(file: TydexFile, measured: tuple[str, ...], axes: str = "iso-w") -> dict[str, np.ndarray | None]:
-    """The inputs of a `RigTable` and those of its `measured` quantities that the file holds, with the signs that it has.
+    """Return the inputs of a `RigTable`, and those of its `measured` quantities that the file has, with the signs of the file.
 
-    Names without a letter of axes count as W. Forces of the wheel's centre are those of the contact point, in C turned by
-    INCLANGL; moments there need the forces, INCLANGL, and LOADRAD (loaded radius) or DSTGRWHC (height of the centre) as well.
-    In other `axes` than ISO-W, which the format demands and some files do not have, only quantities of the contact point count.
+    Names without a letter for the axes count as W. Forces at the wheel's centre equal those at the contact point, rotated by
+    INCLANGL for C; moments there also need the forces, INCLANGL, and LOADRAD (loaded radius) or DSTGRWHC (height of the centre).
+    The format prescribes ISO-W; for files in other `axes` only quantities at the contact point are used.
 
-    **Raises** `InputError` for a unit that is not known, a file without a load or any slip, and axes that cannot be converted
-    with what is in the file; it says what is needed.
+    **Raises** `InputError` for an unknown unit, a file without a load or any slip, and quantities that cannot be converted
+    with the channels in the file; the message names the missing ones.
     """
     rig = _Rig(file, centre=axes in ("iso-w", "ours"))
     if rig.quantity("SLIPANGL", "angle") is None and rig.quantity("LONGSLIP", "ratio") is None:
@@ -56,15 +56,17 @@ def contact_patch(file: TydexFile, measured: tuple[str, ...], axes: str = "iso-w
 
 
 class _Rig:
-    """The quantities of one file, by TYDEX name, in SI units and W axes; those of the wheel's `centre` can be converted where
-    z points up."""
+    """The quantities of one file, by TYDEX name, in SI units and W axes.
+
+    `centre`: whether quantities at the wheel's centre are converted; this is possible only if z points up.
+    """
 
     def __init__(self, file: TydexFile, centre: bool = True):
         self.file, self.centre = file, centre
         self.rows = len(np.asarray(next(iter(file.channels.values())).values))
 
     def quantity(self, name: str, kind: str) -> np.ndarray | None:
-        """A channel, or a constant in each row, in SI units; None where the file has neither."""
+        """Return a channel, or a constant in each row, in SI units; None if the file has neither."""
         channel = self.file.find(name)
         if channel is None:
             return None
@@ -72,7 +74,7 @@ class _Rig:
         where = f"{self.file.source}, line {channel.line}: {name}"
         if channel.unit.casefold() not in known:
             units = ", ".join(unit or "nothing" for unit in known)
-            raise InputError(f"{where}: unit {channel.unit!r}: must be one of {units}, capitals or not.")
+            raise InputError(f"{where}: unit {channel.unit!r}: must be one of {units}, in any case.")
         if isinstance(channel.values, str):
             raise InputError(f"{where} = {channel.values!r}: must be a number.")
         return np.broadcast_to(np.asarray(channel.values) * known[channel.unit.casefold()], self.rows).copy()
@@ -82,12 +84,12 @@ class _Rig:
         if found is None:
             raise InputError(
                 f"{self.file.source}: {for_what} is not in the axes of the contact patch (W), and {name} is needed to convert "
-                "it: add a channel or constant, or leave it out of `measured`."
+                "it: add that channel or constant, or leave the quantity out of `measured`."
             )
         return found
 
     def speed(self) -> np.ndarray | None:
-        """Forward speed of the contact point, m/s."""
+        """Return the forward speed of the contact point, m/s."""
         forward, trajectory = self.quantity("LONGVEL", "speed"), self.quantity("TRAJVELW", "speed")
         if forward is not None:
             return np.abs(forward)
@@ -113,7 +115,7 @@ class _Rig:
         return None if found is None else found + self._arm(axis, name)
 
     def _at_contact(self, kind: str, axis: str, unit: str) -> np.ndarray | None:
-        """A component in axes of the contact patch (W), as it stands in the file; None where the file has none."""
+        """Return a component in axes of the contact patch (W) unchanged from the file; None if the file has none."""
         for name in (f"{kind}{axis}W", f"{kind}{axis}"):
             if (found := self.quantity(name, unit)) is not None:
                 return found
@@ -122,16 +124,16 @@ class _Rig:
         return None
 
     def _refuse_centre(self, name: str) -> None:
-        """Raise where the file has this quantity of the wheel's centre, whose axes are not converted."""
+        """Raise `InputError` if the file has this quantity at the wheel's centre, whose axes are not converted."""
         for centre in (f"{name}H", f"{name}C"):
             if self.file.find(centre) is not None:
                 raise InputError(
-                    f"{self.file.source}: {centre} is in axes of the wheel's centre, which are converted where z points up: "
-                    "leave `axes` out (TYDEX is ISO-W), or leave it out of `measured`."
+                    f"{self.file.source}: {centre} is in axes of the wheel's centre, which are converted only if z points up: "
+                    "leave `axes` out (TYDEX is ISO-W), or leave the quantity out of `measured`."
                 )
 
     def _rotate(self, kind: str, axis: str, unit: str) -> np.ndarray | None:
-        """A component in C axes, turned by the inclination angle about x."""
+        """Return a component from C axes, rotated by the inclination angle about x."""
         name = f"{kind}{axis}C"
         found = self.quantity(name, unit)
         if found is None or axis == "X":
@@ -141,7 +143,7 @@ class _Rig:
         return found * np.cos(camber) + (-other if axis == "Y" else other) * np.sin(camber)
 
     def _arm(self, axis: str, name: str) -> np.ndarray | float:
-        """Moment about the contact point of the forces that act at the wheel's centre: radius vector times force."""
+        """Return the moment about the contact point of the forces at the wheel's centre: radius vector times force."""
         camber = self.require("INCLANGL", "angle", name)
         if axis == "Z" and not camber.any():
             return 0.0
@@ -152,7 +154,7 @@ class _Rig:
         return height * F_x if axis == "Y" else -side * F_x
 
     def _centre(self, camber: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Height of the wheel's centre and its place to the left of the contact point, m."""
+        """Return the height of the wheel's centre and its distance to the left of the contact point, m."""
         height = self.quantity("DSTGRWHC", "length")
         if height is None:
             height = self.require("LOADRAD", "length", name) * np.cos(camber)

@@ -1,4 +1,4 @@
-"""A whole result in one Parquet table: a row along its longest dimension, a column for each place along the others."""
+"""A whole result in one Parquet table: rows along its longest dimension, a column for each place along the others."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from jaxveh.io.optional import require
 _TOLD, _PLACES, _SOURCE, _UNIT = b"jaxveh", b"jaxveh_places", b"source", b"unit"
 MOST_COLUMNS = 4096
 MOST_BESIDE = 2**22
-"""Bytes that may stand in the file's metadata, of what has no row."""
+"""Largest size of the values without rows, which are stored in the file's metadata, bytes."""
 
 
 def write_wide(path: Path, labelled: Labelled) -> None:
-    """Write a result; **raises** `InputError` where it would have too many columns."""
+    """Write a result; **raises** `InputError` if it would have too many columns."""
     arrow = require("pyarrow", "writing Parquet")
     parquet = require("pyarrow.parquet", "writing Parquet")
     along = _longest(labelled)
@@ -44,18 +44,18 @@ def write_wide(path: Path, labelled: Labelled) -> None:
         places[name] = place
     if len(fields) > MOST_COLUMNS or sum(len(str(one.get("values", ""))) for one in places.values()) > MOST_BESIDE:
         raise InputError(
-            f"{path}: a {labelled.kind} of this size is no table: along {along} it has {len(fields)} columns, and more beside "
-            f"them; at most {MOST_COLUMNS} are written. Write .nc."
+            f"{path}: a {labelled.kind} of this size does not fit into a table: along {along} it has {len(fields)} columns, and "
+            f"further values; at most {MOST_COLUMNS} columns are written. Write .nc."
         )
     names = [field.name for field in fields]
     if len(set(names)) < len(names):
-        raise InputError(f"{path}: two columns would have one name. Write .nc.")
+        raise InputError(f"{path}: two columns would have the same name. Write .nc.")
     metadata = {_TOLD: facts_as_text(labelled), _PLACES: json.dumps(places), _SOURCE: labelled.source}
     parquet.write_table(arrow.table(arrays, schema=arrow.schema(fields, metadata=metadata)), path)
 
 
 def read_wide(path: Path) -> Labelled:
-    """What `write_wide` wrote. **Raises** `InputError` for another Parquet file, or a damaged one."""
+    """Read a file of `write_wide`; any other Parquet file gives an empty result. **Raises** `InputError` for a damaged file."""
     require("pyarrow", "reading Parquet")
     parquet = require("pyarrow.parquet", "reading Parquet")
     try:
@@ -73,7 +73,7 @@ def read_wide(path: Path) -> Labelled:
         return arrays_of_text(metadata[_TOLD].decode(), variables, coordinates, source, str(path))
     except InputError:
         raise
-    except Exception as error:  # pyarrow raises whatever a damaged block leads to
+    except Exception as error:  # pyarrow raises any kind of error for a damaged block
         reason = str(error) or type(error).__name__
         raise InputError(f"{path}: is not a readable Parquet file ({reason}). Is the file damaged?") from error
 
@@ -95,12 +95,12 @@ def _values(table: Any, place: dict[str, Any]) -> np.ndarray:
 def _longest(labelled: Labelled) -> str:
     sizes = {d: n for one in labelled.both.values() for d, n in zip(one.dims, np.shape(one.values), strict=True)}
     if not sizes:
-        raise InputError(f"a {labelled.kind} without dimensions is no table. Write .nc.")
+        raise InputError(f"a {labelled.kind} without dimensions does not fit into a table. Write .nc.")
     return max(sizes, key=lambda d: sizes[d])
 
 
 def _stored(values: np.ndarray) -> np.ndarray:
-    """Values of a type that Parquet has."""
+    """Return values of a type that Parquet has."""
     return values.astype(np.float32) if values.dtype.kind == "V" else values
 
 

@@ -1,9 +1,9 @@
 """Figures of recordings, drives, cars, estimates, innovations, tyre forces, parameters and fits, in one restrained style;
-matplotlib is the extra `plot`. A page to zoom into is `log_report`, with Bokeh, the extra `report`.
+matplotlib is the extra `plot`. `log_report` makes a page with zoomable charts; it uses Bokeh, the extra `report`.
 
-Every function returns a matplotlib `Figure` made without pyplot: no window, no global state, shown by notebooks as it
-is. Give `figure=` (a `Figure` or a `SubFigure`) to draw into one of your own. Angles are shown in degrees. Figures of drives
-show a simulation's truth where the recording has it, else what was measured.
+Every function returns a matplotlib `Figure` made without pyplot: there is no window and no global state, and notebooks show
+it directly. Give `figure=` (a `Figure` or a `SubFigure`) to draw into your own. Angles are shown in degrees. Figures of drives
+show a simulation's truth if the recording has it, otherwise the measurements.
 """
 
 from jaxveh.plots import kit

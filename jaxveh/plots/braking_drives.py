@@ -1,4 +1,4 @@
-"""Braking: speeds of car and wheels, slips, deceleration and torque."""
+"""Figures of braking: speeds of car and wheels, slips, deceleration and torque."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from jaxveh.plots.style import COLOURS, CYCLE, label_above, legend, style
 
 
 def braking(recording: Recording, *, wheel_radius: float | None = None, figure: Any = None) -> Any:
-    """Speed and the wheels' speeds (spin times `wheel_radius`, m), slip ratios, deceleration, and brake torque.
+    """Draw the car's speed, the wheel speeds (spin times `wheel_radius`, m), slip ratios, deceleration, and brake torque.
 
-    Without a `wheel_radius` each wheel has that with which it rolls freely in the first row. Panels whose channels the
-    recording lacks are left out. The numbers above are those of `jaxveh.diagnostics.braking_test` (UN R13-H).
+    Without a `wheel_radius` each wheel has the radius with which it rolls freely in the first row. Panels whose channels are
+    missing from the recording are left out. The numbers above are those of `jaxveh.diagnostics.braking_test` (UN R13-H).
 
-    **Returns** the figure. **Raises** `InputError` where the car does not brake, or `v_x` is missing.
+    **Returns** the figure. **Raises** `InputError` if the car does not brake, or `v_x` is missing.
     """
     if wheel_radius is not None:
         check_positive("wheel_radius", wheel_radius, "m")
@@ -53,7 +53,7 @@ def braking(recording: Recording, *, wheel_radius: float | None = None, figure: 
 
 def _words(found: BrakingTest) -> str:
     if not np.isfinite(found.mean_deceleration):
-        return f"brakes at {found.speed:.1f} m/s; not down to a tenth of it"
+        return f"brakes from {found.speed:.1f} m/s; does not reach a tenth of it"
     return (
         f"from {found.speed:.1f} m/s: mean fully developed deceleration {found.mean_deceleration:.2f} m/s², "
         f"{found.distance:.1f} m to a tenth"
@@ -61,7 +61,7 @@ def _words(found: BrakingTest) -> str:
 
 
 def _radii(recording: Recording, v_x: np.ndarray, given: float | None) -> dict[str, float]:
-    """What turns a wheel's spin into a speed, m, by wheel."""
+    """Return the factor from a wheel's spin to its speed, m, by wheel."""
     if given is not None:
         return dict.fromkeys(WHEELS, float(given))
     spins = {wheel: float(drive_channels.channel(recording, f"omega_{wheel}")[0]) for wheel in WHEELS}

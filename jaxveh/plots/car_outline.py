@@ -1,4 +1,4 @@
-"""A car seen from above: its body, its wheels, and the forces on them."""
+"""A car from above: its body, its wheels, and the forces on them."""
 
 from __future__ import annotations
 
@@ -11,21 +11,20 @@ from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import drive_channels
 
 TYPICAL = {"front": 1.2, "rear": 1.5, "track": 1.55}
-"""m: places of axles and the track of an ordinary passenger car, for recordings that come without the car."""
+"""Positions of the axles and track of an ordinary passenger car, m, for recordings without a car."""
 
 OVERHANG = (0.85, 0.95)
-"""m: from the axles to the bumpers in front and behind; ours."""
+"""Distances from the axles to the bumpers in front and behind, m; our choice."""
 
 BESIDE = 0.12
-"""m: from a wheel's middle to the body's side; ours."""
+"""Distance from a wheel's centre to the side of the body, m; our choice."""
 
 WHEEL = 0.65
-"""m: diameter of a wheel as drawn."""
+"""Diameter of a drawn wheel, m."""
 
 
 class Footprint(NamedTuple):
-    """Distances (m): from the centre of gravity to the front and the rear axle, and the tracks; `single` for a car whose wheels
-    are on one track."""
+    """Distances (m): from the centre of gravity to the front and the rear axle, and the tracks; `single`: a single-track car."""
 
     front: float
     rear: float
@@ -35,7 +34,7 @@ class Footprint(NamedTuple):
 
     @property
     def wheels(self) -> dict[str, tuple[float, float]]:
-        """(x, y), m, of each wheel (`fl` ...), or of each axle (`f`, `r`) of a single track."""
+        """Position (x, y), m, of each wheel (`fl` ...), or of each axle (`f`, `r`) of a single track."""
         if self.single:
             return {"f": (self.front, 0.0), "r": (-self.rear, 0.0)}
         left = {"fl": (self.front, self.track_front / 2), "rl": (-self.rear, self.track_rear / 2)}
@@ -43,7 +42,7 @@ class Footprint(NamedTuple):
 
     @property
     def body(self) -> np.ndarray:
-        """The outline, (n, 2), m, with a nose."""
+        """The outline of the body, (n, 2), m."""
         half = max(self.track_front, self.track_rear) / 2 + BESIDE
         nose, tail = self.front + OVERHANG[0], -self.rear - OVERHANG[1]
         return np.array(
@@ -59,7 +58,7 @@ class Footprint(NamedTuple):
 
 
 def footprint(recording: Recording, car: Any, wheelbase: float | None, track: float | None) -> Footprint:
-    """The footprint of a `car` (what wraps it is looked through) or, without one, of a wheelbase and a track (m)."""
+    """Return the footprint of a `car` (inside any wrapper) or, without one, of a wheelbase and a track (m)."""
     while hasattr(car, "vehicle"):
         car = car.vehicle
     for name, value in (("wheelbase", wheelbase), ("track", track)):
@@ -84,18 +83,20 @@ def footprint(recording: Recording, car: Any, wheelbase: float | None, track: fl
 
 
 def rotate(points: Any, angle: float) -> np.ndarray:
-    """Points (n, 2) turned to the left by an angle (rad)."""
+    """Return points (n, 2) rotated to the left by an angle (rad)."""
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.asarray(points) @ np.array([[cosine, sine], [-sine, cosine]])
 
 
 ANGLES = {"fl": ("steer_left",), "fr": ("steer_right",)}
-"""What logs call a front wheel's own angle, too."""
+"""Further names in logs for a front wheel's own angle."""
 
 
 def wheel_angles(recording: Recording, footprint: Footprint) -> dict[str, np.ndarray]:
-    """How far each wheel is turned against the car, (T,), rad: by its own angle where that is known, else the front wheels by the
-    steer, and rear ones not at all."""
+    """Return the angle of each wheel relative to the car, (T,), rad.
+
+    It is the wheel's own angle if that is known, otherwise that of its axle, and zero if neither is known.
+    """
     found = {}
     for name in footprint.wheels:
         asked = (f"steer_{name}", *ANGLES.get(name, ()), "steer" if name[0] == "f" else "steer_rear")
@@ -105,7 +106,7 @@ def wheel_angles(recording: Recording, footprint: Footprint) -> dict[str, np.nda
 
 
 def wheel_forces(recording: Recording, footprint: Footprint) -> dict[str, np.ndarray]:
-    """Forces of the road on each wheel in the car's directions, (T, 2), N; empty where the recording has none."""
+    """Return the forces of the road on each wheel in the car's axes, (T, 2), N; empty if the recording has none."""
     forces = {}
     angles = wheel_angles(recording, footprint)
     for name in footprint.wheels:

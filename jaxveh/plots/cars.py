@@ -1,4 +1,4 @@
-"""A car from above with its measures."""
+"""A car from above with its dimensions."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ from jaxveh.plots.style import COLOURS, CYCLE, new_figure, style
 from jaxveh.vehicles import AbstractVehicle
 
 WIDTH = 0.2
-"""m: of a wheel as drawn."""
+"""Width of a drawn wheel, m."""
 
 LEAST_TRACK = 0.3
-"""m: wheels that are nearer to each other lie on one track."""
+"""Wheels of an axle that are closer to each other count as on one track, m."""
 
 
 def car(vehicle: AbstractVehicle | CarSpecification, *, figure: Any = None) -> Any:
-    """The car from above: where its wheels touch the road, with wheelbase, tracks and the place of the point that its speeds
-    belong to (the centre of gravity, unless the vehicle says otherwise), in m. The body around them is ours.
+    """Draw the car from above: its wheels, with wheelbase and tracks in m, and the reference point of its speeds.
 
-    **Returns** the figure; `figure`: where to draw. **Raises** `InputError` for a car without wheels, or a batch of cars.
+    The reference point is the centre of gravity, unless the vehicle has another one. The body around the wheels is our choice.
+
+    **Returns** the figure; `figure`: the figure to draw into. **Raises** `InputError` for a car without wheels, or a batch of
+    cars.
     """
     places = _places(vehicle)
     if any(np.ndim(number) for place in places for number in place):
@@ -31,7 +33,7 @@ def car(vehicle: AbstractVehicle | CarSpecification, *, figure: Any = None) -> A
     wheels = np.array([[float(number) for number in place] for place in places])
     front, rear = wheels[:2, 0].mean(), wheels[2:, 0].mean()
     if front - rear <= 0:
-        raise InputError(f"plots.car: {type(vehicle).__name__} has no wheels at places of their own: nothing to draw.")
+        raise InputError(f"plots.car: {type(vehicle).__name__} has no positions of its wheels: nothing to draw.")
     tracks = [float(np.ptp(pair[:, 1])) for pair in (wheels[:2], wheels[2:])]
     half = max(*tracks, 1.0) / 2 + BESIDE
     with style():
@@ -65,7 +67,7 @@ def car(vehicle: AbstractVehicle | CarSpecification, *, figure: Any = None) -> A
 
 
 def _places(vehicle: AbstractVehicle | CarSpecification) -> tuple[tuple[Any, Any], ...]:
-    """Where the wheels stand, as `AbstractVehicle.wheel_positions`; of a file without tracks on one."""
+    """Return the positions of the wheels like `AbstractVehicle.wheel_positions`; a file without tracks has a single track."""
     if isinstance(vehicle, AbstractVehicle):
         return vehicle.wheel_positions
     front, rear = (vehicle.track_front or 0.0) / 2, (vehicle.track_rear or 0.0) / 2
@@ -74,6 +76,6 @@ def _places(vehicle: AbstractVehicle | CarSpecification) -> tuple[tuple[Any, Any
 
 
 def _measure(ax: Any, start: tuple[float, float], end: tuple[float, float], y: float, words: str) -> None:
-    """A line from one place to another below the car, with its length."""
+    """Draw a dimension line from one point to another below the car, with its length."""
     ax.plot([start[0], end[0]], [y, y], "|-", color=COLOURS["truth"], lw=0.8, ms=6)
     ax.annotate(words, ((start[0] + end[0]) / 2, y + 0.03), ha="center", va="bottom", fontsize=8)

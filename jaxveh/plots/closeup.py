@@ -1,4 +1,4 @@
-"""The part of a log that its estimate is worst in, with what the car was doing."""
+"""The part of a log in which its estimate is worst, with the motion of the car."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from jaxveh.plots.quantities import quantity
 from jaxveh.plots.style import COLOURS, CYCLE, label_above, legend, new_figure, style
 
 CHANNELS = ("v_x", "yaw_rate", "a_y", "steer")
-"""What is shown below, as far as the log has it."""
+"""The channels below the estimate, as far as the log has them."""
 
 
 def closeup(
@@ -30,15 +30,16 @@ def closeup(
     least_speed: float = 0.0,
     figure: Any = None,
 ) -> Any:
-    """The worst `seconds` of an estimate, and the log's channels below: those about the largest error against the truth, or,
-    where there is none, about the widest band.
+    """Draw the worst `seconds` of an estimate with the log's channels below.
+
+    They are the seconds about the largest error against the truth or, without a truth, about the widest band.
 
     **Arguments**: `estimate`: of `jaxveh.run` or a smoother, with `time` (T,), `mean` and `std` by name. `recording`: the log
-    with the same rows. `truth`, `others`: names to (T,), and labels to such, as in `plots.estimate`. `quantity_name`: which
-    is shown. `channels`: of the log (default: those of `CHANNELS` that it has). `least_speed` (m/s): slower rows are not
-    looked for, where the log has `v_x`. `figure`: where to draw.
+    with the same rows. `truth`, `others`: names to (T,), and labels to such mappings, as in `plots.estimate`. `quantity_name`:
+    the quantity to show. `channels`: of the log (default: those of `CHANNELS` that it has). `least_speed` (m/s): slower rows do
+    not count, if the log has `v_x`. `figure`: the figure to draw into.
 
-    **Returns** the figure. **Raises** `InputError` for unknown names, rows that do not agree, or where nothing is finite.
+    **Returns** the figure. **Raises** `InputError` for unknown names, rows that do not agree, or if there is no finite value.
     """
     mean = as_mapping(estimate.mean, "mean")
     check_names("plots.closeup", [quantity_name], mean)
@@ -66,7 +67,7 @@ def closeup(
 def worst_span(
     estimate: Any, recording: Recording, truth: Mapping[str, Any] | None, name: str, *, seconds: float, least_speed: float
 ) -> tuple[float, float, str]:  # fmt: skip
-    """Start and end (s) of the worst part of an estimate, inside the log, and in words what is worst there."""
+    """Return start and end (s) of the worst part of an estimate, inside the log, and a description of the worst row."""
     check_positive("seconds", seconds, "s")
     time, shown = np.asarray(estimate.time, np.float64), quantity(name)
     if time.shape != np.shape(recording.time):
@@ -80,7 +81,7 @@ def worst_span(
     if "v_x" in recording:
         counted &= ~(np.asarray(recording["v_x"]) < least_speed)
     if not counted.any():
-        raise InputError(f"plots.closeup: no row at {least_speed:g} m/s or more has a finite {name} to look at.")
+        raise InputError(f"plots.closeup: no row at {least_speed:g} m/s or more has a finite {name}.")
     worst = int(np.argmax(np.where(counted, badness, -np.inf)))
     first = min(max(time[worst] - seconds / 2, time[0]), max(time[-1] - seconds, time[0]))
     space = "" if what.endswith("±") else " "
@@ -89,7 +90,7 @@ def worst_span(
 
 
 def _estimate(ax: Any, estimate: Any, rows: np.ndarray, name: str, truth: Mapping, others: Mapping) -> None:
-    """Bands, estimate, the others and the truth over the rows alone, which set the scale."""
+    """Draw bands, estimate, others and truth over these rows alone, so that they set the scale."""
     shown, time = quantity(name), np.asarray(estimate.time)[rows]
     centre, std = (shown.show(as_mapping(part, "estimate")[name])[rows] for part in (estimate.mean, estimate.std))
     if name in truth:

@@ -1,4 +1,4 @@
-"""What a test engineer would look at after a drive, by the manoeuvre's name."""
+"""The usual figure of a drive, by the manoeuvre's name."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from jaxveh.plots.top_views import top_view, top_view_height
 from jaxveh.vehicles import LinearSingleTrack, linear_single_track
 
 OVERVIEW_HEIGHT = 5.2
-"""Inches of what the car does, beneath a view from above."""
+"""Height of the overview below a top view, inches."""
 
 
 class Seen(NamedTuple):
-    """What a figure is made of."""
+    """The arguments of a figure."""
 
     recording: Recording
     course: Course | None
@@ -48,15 +48,14 @@ def drive(
     steer_at_03g: float | None = None,
     figure: Any = None,
 ) -> Any:
-    """The figure of a drive by its `manoeuvre`'s name in `jaxveh.manoeuvres.MANOEUVRES`.
+    """Draw the figure of a drive for its `manoeuvre`'s name in `jaxveh.manoeuvres.MANOEUVRES`.
 
-    A step of steer has its step response, sweeps and random steering the frequency response (beside it that of the `car` made
-    linear), slow turns the handling diagram,
-    the sine with dwell its criteria, braking speeds and slips, and lane changes and slaloms a view from above over what the
-    car does; others, and drives without a name, what the car does alone. `course`, `car` and `wheelbase` (m; by default the
-    car's) as in `top_view` and `handling_diagram`, `steer_at_03g` (rad) as in `sine_with_dwell`.
+    A step of steer has its step response; sweeps and random steering have the frequency response, beside that of the linearised
+    `car`; slow turns have the handling diagram, the sine with dwell its criteria, braking speeds and slips, and lane changes and
+    slaloms a top view above the overview. Other drives, and drives without a name, have the overview alone. `course`, `car` and
+    `wheelbase` (m; by default the car's) as in `top_view` and `handling_diagram`, `steer_at_03g` (rad) as in `sine_with_dwell`.
 
-    **Returns** the figure. **Raises** `InputError` for an unknown name, or where the drive does not carry its figure.
+    **Returns** the figure. **Raises** `InputError` for an unknown name, or if the drive does not allow its figure.
     """
     if manoeuvre is not None:
         check_one_of("manoeuvre", manoeuvre, MANOEUVRES)
@@ -75,8 +74,10 @@ def _frequency(seen: Seen) -> Any:
 
 
 def linear_response(recording: Recording, car: Any) -> dict[str, Callable[[np.ndarray], Any]]:
-    """The response of the linear single track with a car's slopes at the drive's mean speed, by output, for
-    `frequency_response`; empty for a car that has none."""
+    """Return the frequency response of a car's linear single track at the drive's mean speed, by output.
+
+    It is for `frequency_response`, and empty for a car that cannot be linearised.
+    """
     if isinstance(car, LinearSingleTrack):
         linear = car
     elif all(

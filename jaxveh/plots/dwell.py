@@ -23,14 +23,14 @@ def sine_with_dwell(
     displacement_limit: float = kit.DISPLACEMENT,
     figure: Any = None,
 ) -> Any:
-    """Steer, yaw rate and, where the recording has a position, the lateral way, with the criteria of FMVSS 126 in words.
+    """Draw steer, yaw rate and, if the recording has a position, the lateral displacement, with the criteria of FMVSS 126.
 
     Marked are the yaw rate 1.0 s and 1.75 s after the completion of steer with its limits (35 % and 20 % of the peak), and the
-    lateral displacement 1.07 s after the beginning of steer, with its limit where it has one. The numbers are those of
-    `jaxveh.diagnostics.sine_with_dwell` (which see for the arguments); curves and marks are as recorded, the offsets that it
-    takes out still in them.
+    lateral displacement 1.07 s after the beginning of steer, with its limit if it has one. The numbers are those of
+    `jaxveh.diagnostics.sine_with_dwell`, which explains the arguments; curves and marks are as recorded, including the offsets
+    that it removes.
 
-    **Returns** the figure. **Raises** `InputError` where the steer is no sine with dwell, or the drive ends too early.
+    **Returns** the figure. **Raises** `InputError` if the steer is not a sine with dwell, or the drive ends too early.
     """
     found = measure(
         recording, steering_ratio=steering_ratio, steer_at_03g=steer_at_03g, displacement_limit=displacement_limit
@@ -86,7 +86,7 @@ def _dot(ax: Any, at: float, value: float, allowed: bool) -> None:
 
 
 def _way(ax: Any, recording: Recording, found: SineWithDwellTest, limit: float) -> None:
-    """How far the car is left of its initial straight path."""
+    """Draw the displacement of the car to the left of its initial straight path."""
     time, yaw = drive_channels.seconds(recording), drive_channels.channel(recording, "yaw")[0]
     x, y = (drive_channels.channel(recording, name) for name in ("x", "y"))
     left = y * np.cos(yaw) - x * np.sin(yaw)
@@ -103,7 +103,7 @@ def _way(ax: Any, recording: Recording, found: SineWithDwellTest, limit: float) 
     else:
         ax.plot([at], [there], "o", color=GREY, markersize=5, label="not judged")
     label_above(ax, "lateral displacement [m]")
-    # What happens long after the instant would hide it.
+    # The scale is limited, because the motion long after the instant would hide it.
     reach = 3.0 * max(abs(there), limit)
     low, high = ax.get_ylim()
     ax.set_ylim(max(low, -reach), min(high, reach))

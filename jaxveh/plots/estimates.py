@@ -1,4 +1,4 @@
-"""Estimates over time: mean, the bands that should hold the truth in 50 and 95 % of the rows, and the truth."""
+"""Estimates over time: mean, the bands that should contain the truth in 50 and 95 % of the rows, and the truth."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from jaxveh.plots.quantities import quantity
 from jaxveh.plots.style import COLOURS, colour, label_above, legend, new_figure, style
 
 BAND, HALF_BAND = 1.959963984540054, 0.6744897501960817
-"""Standard deviations of a normal law's central 95 and 50 %."""
+"""Half the widths of the central 95 and 50 % intervals of a normal distribution, in standard deviations."""
 
 MOST_ROWS = 12
-"""Rows of a long log: a longer one has longer rows."""
+"""Largest number of rows for a long log; a longer log has longer rows."""
 
 
 class Shown(NamedTuple):
-    """What the panels of a figure are drawn from."""
+    """The data of a figure's panels."""
 
     labelled: dict[str, Any]
     time: np.ndarray
     truth: Any
     others: Mapping[str, Mapping[str, Any]]
     fine: float
-    """Lines are thinner by this factor."""
+    """The factor of the line widths."""
 
     def has_truth(self, name: str) -> bool:
         """Whether there is a truth of a quantity."""
@@ -46,17 +46,18 @@ def estimate(
     seconds: float = 60.0,
     figure: Any = None,
 ) -> Any:
-    """A panel a quantity: mean, bands of 50 and 95 % and, where given, the truth; a long log in rows beneath each other.
+    """Draw a panel per quantity with mean, bands of 50 and 95 % and, if given, the truth; a long log is split into rows.
 
     **Arguments**: `estimates`: an `Estimate` of `jaxveh.run` (or anything with `time`, `mean` and `std` by name), or a
-    mapping from labels to several, of which the 95 % band alone is shown. `truth`: a recording, or a mapping from names to (T,)
-    arrays over the time of the first estimate. `quantities`: names to show (default: all that the first reports). `others`:
-    label to a mapping from names to (T,) without spread, such as an open-loop model's, over the time of the first. `errors`:
-    beside each panel (beneath each row of a long log) another with the estimates less the truth (over the same rows), and their
-    bands. `seconds`: of a row, about; a log of more than one and a half has rows, at most `MOST_ROWS` a quantity. `figure`: where
-    to draw.
+    mapping from labels to several, which are drawn with only their 95 % bands. `truth`: a recording, or a mapping from names to
+    (T,) arrays over the time of the first estimate. `quantities`: names to show (default: all of the first estimate). `others`:
+    label to a mapping from names to (T,) without standard deviations, such as those of an open-loop model, over the time of the
+    first. `errors`: adds beside each panel (below each row of a long log) another with the estimates less the truth (over the
+    same rows), and their bands. `seconds`: approximate length of a row; a log longer than one and a half rows is split into at
+    most `MOST_ROWS` rows per quantity. `figure`: the figure to draw into.
 
-    **Returns** the figure. **Raises** `InputError` for unknown quantities, a truth of another length, or rows of no time.
+    **Returns** the figure. **Raises** `InputError` for unknown quantities, a truth of another length, or `seconds` that are not
+    positive.
     """
     labelled = dict(estimates) if isinstance(estimates, Mapping) else {"estimate": estimates}
     if not labelled:
@@ -70,7 +71,7 @@ def estimate(
     check_positive("seconds", seconds, "s")
     time = np.asarray(first.time)
     spans = rows_of(time, seconds)
-    # Rows hold more, and bands beside thick lines would not show.
+    # Rows show more time, and bands beside thick lines would not be visible.
     shown = Shown(labelled, time, truth, others or {}, 1.0 if len(spans) == 1 else 0.65)
     with style():
         draw = _beside if len(spans) == 1 else _in_rows
@@ -80,7 +81,7 @@ def estimate(
 
 
 def rows_of(time: np.ndarray, seconds: float) -> list[tuple[float, float]]:
-    """Spans of equal length (s), about `seconds`, that a log of stamps (T,) falls into."""
+    """Split a log with time stamps (T,) into spans of equal length (s), about `seconds` each."""
     start, end = float(time[0]), float(time[-1])
     count = min(max(1, round((end - start) / seconds)), MOST_ROWS)
     edges = np.linspace(start, end, count + 1)
@@ -88,7 +89,7 @@ def rows_of(time: np.ndarray, seconds: float) -> list[tuple[float, float]]:
 
 
 def _beside(shown: Shown, names: list[str], spans: Any, errors: bool, figure: Any) -> tuple[Any, Any]:
-    """A panel a quantity, its errors on the right."""
+    """Draw a panel per quantity, with its errors on the right."""
     del spans
     figure = new_figure(0.75 + 1.25 * len(names)) if figure is None else figure
     ratios = [3, 2] if errors else [1]
@@ -105,8 +106,10 @@ def _beside(shown: Shown, names: list[str], spans: Any, errors: bool, figure: An
 
 
 def _in_rows(shown: Shown, names: list[str], spans: list, errors: bool, figure: Any) -> tuple[Any, Any]:
-    """Rows of a quantity over each other, each with its errors beneath, all to one scale: each panel has all rows, of which it
-    shows its own."""
+    """Draw the rows of a quantity above each other, each with its errors below, all to one scale.
+
+    Each panel contains the data of all rows, and shows its own part of the time.
+    """
     kinds = [
         (name, span, draw)
         for name in names
@@ -124,7 +127,7 @@ def _in_rows(shown: Shown, names: list[str], spans: list, errors: bool, figure: 
 
 
 def _values(ax: Any, shown: Shown, name: str) -> None:
-    """A quantity as it was estimated, and the truth."""
+    """Draw the estimates of a quantity, and the truth."""
     in_unit = quantity(name)
     _truth(ax, shown, name)
     for index, (label, values) in enumerate(shown.others.items()):
@@ -138,7 +141,7 @@ def _values(ax: Any, shown: Shown, name: str) -> None:
 
 
 def _errors(ax: Any, shown: Shown, name: str) -> None:
-    """What the estimates have more than the truth."""
+    """Draw the estimates less the truth."""
     in_unit = quantity(name)
     for index, (label, one) in enumerate(shown.labelled.items()):
         against = in_unit.show(shown.truth[name])
@@ -154,12 +157,12 @@ def _truth(ax: Any, shown: Shown, name: str) -> None:
     values = quantity(name).show(shown.truth[name])
     if values.shape != at.shape:
         raise InputError(f"plots.estimate: truth {name} has shape {values.shape}, time has {at.shape}; must agree.")
-    # Thicker than the estimates, which lie on it when they are good.
+    # Thicker than the estimates, because good estimates cover it.
     ax.plot(at, values, color=COLOURS["truth"], linewidth=1.7 * shown.fine, label="truth")
 
 
 def _keep_truth_readable(ax: Any) -> None:
-    """Where an estimate diverges it leaves the panel: the truth sets the scale, with room around it."""
+    """Set the scale by the truth, with room around it: an estimate that diverges leaves the panel."""
     true = [line.get_ydata() for line in ax.get_lines() if line.get_label() == "truth"]
     if not true or not np.isfinite(true[0]).any():
         return
@@ -171,7 +174,7 @@ def _keep_truth_readable(ax: Any) -> None:
 
 
 def _one(ax: Any, shown: Shown, one: Any, name: str, label: str, shade: str, against: Any = 0.0) -> None:
-    """Mean and bands of one estimate, less the values that it is held against."""
+    """Draw mean and bands of one estimate, less the values `against` which it is compared."""
     mean, std = as_mapping(one.mean, "mean"), as_mapping(one.std, "std")
     if name not in mean:
         return
@@ -181,7 +184,7 @@ def _one(ax: Any, shown: Shown, one: Any, name: str, label: str, shade: str, aga
             f"plots.estimate: truth {name} has shape {np.shape(against)}, {label} {time.shape}; must agree."
         )
     centre = in_unit.show(mean[name]) - against
-    # Who claims no spread says NaN, and has no band.
+    # Methods without standard deviations have NaN, and no band.
     if name in std and not np.isnan(np.asarray(std[name])).all():
         bands(ax, time, centre, in_unit.show(std[name]), label, shade, half=len(shown.labelled) == 1)
     ax.plot(time, centre, color=shade, linewidth=1.1 * shown.fine, label=label)
@@ -190,7 +193,7 @@ def _one(ax: Any, shown: Shown, one: Any, name: str, label: str, shade: str, aga
 def bands(
     ax: Any, time: np.ndarray, centre: np.ndarray, std: np.ndarray, label: str, shade: str, *, half: bool = True
 ) -> None:
-    """The central 95 %, and `half` as well: of normal laws about `centre` (T,) with `std` (T,)."""
+    """Draw the central 95 % band, and with `half` the 50 % band, of normal distributions about `centre` (T,) with `std` (T,)."""
     for share, width, alpha in ((95, BAND, 0.22), (50, HALF_BAND, 0.4))[: 1 + half]:
         low, high = centre - width * std, centre + width * std
         ax.fill_between(time, low, high, color=shade, alpha=alpha, lw=0, label=f"{label}, {share} % band")

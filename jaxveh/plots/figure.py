@@ -1,4 +1,4 @@
-"""A matplotlib figure that notebooks show by themselves."""
+"""A matplotlib figure that notebooks show automatically."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from jaxveh.io import kit
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Base
 else:
-    # Whoever imports the room without matplotlib is told which extra has it.
+    # An import of the subpackage without matplotlib raises an error that names the extra.
     Base = kit.require("matplotlib.figure", "drawing figures", "plot").Figure
 
 
 class Figure(Base):
-    """A figure made without pyplot: nothing global holds it, and a notebook shows it as a picture."""
+    """A figure made without pyplot: it is not part of any global state, and a notebook shows it as a picture."""
 
     def _repr_png_(self) -> bytes:
         from jaxveh.plots.style import style

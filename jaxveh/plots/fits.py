@@ -13,15 +13,16 @@ from jaxveh.plots.estimates import BAND
 from jaxveh.plots.style import COLOURS, CYCLE, new_figure, style
 
 MOST = 40
-"""Rows that fit on a page."""
+"""Largest number of rows on a page."""
 
 
 def fit(fit: Any, truth: Mapping[str, Any] | None = None, *, figure: Any = None) -> Any:
-    """A row a parameter: how far it is from its `truth` (by name), with its 95 % bar, in per cent of the truth; without a truth
-    the bars alone, in per cent of the value. What has no standard error has no bar.
+    """Draw the deviation of each parameter from its `truth` (by name), a row each, with its 95 % bar, in per cent of the truth.
+
+    Without a truth only the bars are drawn, in per cent of the value. A parameter without a standard error has no bar.
 
     **Arguments**: `fit`: anything with `parameters` and `parameters_std`, such as a fit, or `Parameters` themselves, of one
-    number each. `figure`: where to draw.
+    number each. `figure`: the figure to draw into.
 
     **Returns** the figure. **Raises** `InputError` for arrays, more than 40 parameters, or a truth without one of them.
     """

@@ -1,4 +1,4 @@
-"""Lateral force over slip angle of both axles: the truth, the prior's band, and what estimators made of it."""
+"""Lateral force over slip angle of both axles: the truth, the prior's band, and the estimates."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def force_curves(
     errors: bool = True,
     figure: Any = None,
 ) -> Any:
-    """Each axle's lateral force over the slip angles that were visited and, beneath, the error against the truth.
+    """Draw each axle's lateral force over the visited slip angles and, below it, the error against the truth.
 
-    **Arguments**: `cars`: label to a car with `front` and `rear` tyres; one labelled `truth` is black, and errors refer
-    to it and to its greatest force there. `slips`: `front` and `rear`, the visited slip angles (T,) in radians, shown
+    **Arguments**: `cars`: label to a car with `front` and `rear` tyres; the one labelled `truth` is black, and errors refer
+    to it, in per cent of its largest force there. `slips`: `front` and `rear`, the visited slip angles (T,) in radians, shown
     as a rug. `draws`: a car whose tyres have a leading axis of draws of the prior, shown as a band of 95 %.
-    `errors=False`, or no truth, leaves the lower row out. Loads are static. `figure`: where to draw.
+    With `errors=False`, or without a truth, there is no lower row. Loads are static. `figure`: the figure to draw into.
 
-    **Returns** the figure. **Raises** `InputError` where an axle's slips are missing.
+    **Returns** the figure. **Raises** `InputError` if an axle's slips are missing.
     """
     for axle in AXLES:
         check_one_of("axle", axle, tuple(slips))
@@ -67,7 +67,7 @@ def _curves(ax: Any, axle: str, cars: Mapping[str, Any], visited: Any, draws: An
 
 
 def _rug(ax: Any, degrees: np.ndarray) -> None:
-    """Where the car has been: what the measurements can know of."""
+    """Mark the visited slip angles, about which the measurements have information."""
     ax.plot(degrees, np.full(degrees.shape, 0.025), "|", color="#444444", ms=6, mew=0.4, alpha=0.3, zorder=1,
             transform=ax.get_xaxis_transform())  # fmt: skip
     ax.text(0.99, 0.06, "slip angles visited", transform=ax.transAxes, ha="right", va="bottom", fontsize=7.5,
@@ -84,21 +84,21 @@ def _errors(ax: Any, axle: str, cars: Mapping[str, Any], visited: Any) -> None:
         _line(ax, degrees, error, label, index)
         if label not in ("truth", "prior"):
             worst = max(worst, float(np.max(np.abs(error))))
-    # The prior's errors run off the panel on purpose: the estimators' are what it is about.
+    # The prior's errors leave the panel on purpose: its scale is that of the estimators' errors.
     reach = max(1.5 * worst, 1.0)
     ax.set_ylim(-reach, reach)
 
 
 def _line(ax: Any, degrees: np.ndarray, values: np.ndarray, label: str, index: int) -> None:
     weight = {"truth": 2.2, "prior": 1.1}.get(label, 1.2)
-    # Estimators that agree lie on each other: dashes let the one beneath be seen.
+    # Lines of estimators that agree coincide: dashes keep the lower line visible.
     dashes = {"prior": "--", "MAP": (0, (4, 2))}.get(label, "-")
     order = {"truth": 2.0, "prior": 2.1}.get(label, 2.5 + 0.01 * index)
     ax.plot(degrees, values, linestyle=dashes, color=colour(label, index), lw=weight, zorder=order, label=label)
 
 
 def _grid(visited: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Slip angles over the visited range, in radians and degrees."""
+    """Return slip angles over the visited range, in radians and degrees."""
     visited = np.asarray(visited, dtype=np.float64)
     if not np.isfinite(visited).any():
         raise InputError("plots.force_curves: no finite slip angle to show.")
@@ -107,14 +107,14 @@ def _grid(visited: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def lateral_force(car: Any, axle: str, slip: np.ndarray) -> np.ndarray:
-    """The axle's lateral force over slip angles (S,) at its static load, N: (S,)."""
+    """Return the axle's lateral force (S,), N, at slip angles (S,) and its static load."""
     load = car.static_loads()[AXLES.index(axle)]
     contact = Contact(slip_angle=jax.numpy.asarray(slip, load.dtype), load=load)
     return np.asarray(getattr(car, axle).forces(contact).F_y, dtype=np.float64)
 
 
 def _band(draws: Any, axle: str, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The central 95 % of the draws' forces at each slip angle, N."""
+    """Return the limits of the central 95 % of the draws' forces at each slip angle, N."""
     load = draws.static_loads()[AXLES.index(axle)]
     at = Contact(slip_angle=jax.numpy.asarray(slip, load.dtype), load=load)
     forces = jax.vmap(lambda tyre: tyre.forces(at).F_y)(getattr(draws, axle))

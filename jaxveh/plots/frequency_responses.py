@@ -24,12 +24,13 @@ def frequency_response(
     closed_form: Mapping[str, Callable[[np.ndarray], Any]] | None = None,
     figure: Any = None,
 ) -> Any:
-    """A column an output: gain of output over steer, phase and coherence over Hz.
+    """Draw gain of output over steer, phase and coherence over frequency in Hz, a column per output.
 
-    Estimated by `jaxveh.diagnostics.frequency_response` (which see for `segment`, s). `closed_form`: output to a function
-    from frequencies (n,) in Hz to the complex response (n,) in SI units, such as that of a linear single track; drawn beside.
+    They are estimated by `jaxveh.diagnostics.frequency_response`, which explains `segment` (s). `closed_form`: output to a
+    function from frequencies (n,) in Hz to the complex response (n,) in SI units, such as that of a linear single track, which is
+    also drawn.
 
-    **Returns** the figure. **Raises** `InputError` where the recording has no such steering, or lacks an output.
+    **Returns** the figure. **Raises** `InputError` if the recording has no such steering, or an output is missing.
     """
     outputs = [output] if isinstance(output, str) else list(output)
     closed_form = closed_form or {}
@@ -62,7 +63,7 @@ def frequency_response(
 
 
 def _response(column: Any, name: str, frequency: np.ndarray, response: np.ndarray, **line: Any) -> None:
-    # Steer is in degrees, so that an angle over it keeps its number.
+    # Steer is in degrees, so that the gain of an angle keeps its value.
     per_degree = display_of(name).factor * np.pi / 180
     column[0].plot(frequency, np.abs(response) * per_degree, **line)
     column[1].plot(frequency, np.degrees(np.unwrap(np.angle(response))), **line)

@@ -1,4 +1,4 @@
-"""What a tyre can do at most: lateral over longitudinal force of combined slip, and the limit around them."""
+"""The limits of a tyre: lateral over longitudinal force in combined slip, and the limit around them."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ POINTS = 301
 SLIP_ANGLE = np.radians(20.0)
 SLIP_ANGLES = tuple(np.radians((1.0, 2.0, 4.0, 8.0, 16.0)))
 DIRECTIONS = 120
-"""Sectors around the origin in which the greatest force is looked for."""
+"""Number of sectors around the origin; the largest force of each is on the limit."""
 
 BEND = 4.0
-"""How much denser slips lie at zero than at the ends: there the force turns fastest."""
+"""Parameter of the density of slips, which is higher at zero, where the direction of the force changes fastest."""
 
 
 def friction_ellipse(
@@ -31,15 +31,15 @@ def friction_ellipse(
     slip_ratio: float = 1.0,
     figure: Any = None,
 ) -> Any:
-    """Lateral over longitudinal force at slip angles of either sign, the limit, and the ellipse of the pure peaks.
+    """Draw lateral over longitudinal force at slip angles of either sign, the limit, and the ellipse of the pure peaks.
 
-    The limit is the greatest force of each direction over all slips up to `slip_angle` (rad) and `slip_ratio` (-), in either
-    sense. The ellipse, in four quarters, goes through the peaks of pure slip: where the limit leaves it, the law's
-    combined slip is no ellipse.
+    The limit is the largest force in each direction over all slips up to `slip_angle` (rad) and `slip_ratio` (-) of either
+    sign. The ellipse, in four quarters, passes through the peaks of pure slip: where the limit differs from it, the law's
+    combined slip is not an ellipse.
 
-    **Arguments**: `law`: a tyre without states; `load` (N); `slip_angles` (rad), not negative: a curve each way.
-    `figure`: where to draw. **Returns** the figure. **Raises** `InputError` for a load or a range of slip that is not
-    positive, a bad slip angle, or a law without one of the two forces.
+    **Arguments**: `law`: a tyre without states; `load` (N); `slip_angles` (rad), not negative: each has a curve for either sign.
+    `figure`: the figure to draw into. **Returns** the figure. **Raises** `InputError` for a load or a range of slip that is not
+    positive, a negative slip angle, or a law without one of the two forces.
     """
     _check(load, slip_angles, slip_angle, slip_ratio)
     ratio = slip_ratio * _dense_at_zero()
@@ -61,7 +61,7 @@ def friction_ellipse(
                 ax.plot(found.F_x / 1e3, found.F_y / 1e3, color=shade, label=_label(i, angle))
         F_x, F_y = limit(grid.F_x, grid.F_y)
         ax.plot(F_x / 1e3, F_y / 1e3, color=COLOURS["truth"], lw=1.8, label="limit")
-        # Slip zero is the middle of an odd number of points.
+        # Zero slip is the middle of an odd number of points.
         F_x, F_y = ellipse(grid.F_x[POINTS // 2], grid.F_y[:, POINTS // 2])
         ax.plot(F_x / 1e3, F_y / 1e3, "--", color=COLOURS["prior"], lw=1.0, label="ellipse of the pure peaks")
         ax.set_aspect("equal", adjustable="datalim")
@@ -73,13 +73,13 @@ def friction_ellipse(
 
 
 def limit(F_x: Any, F_y: Any) -> tuple[np.ndarray, np.ndarray]:
-    """The greatest force in each of `DIRECTIONS` sectors, around the origin and closed; sectors without a force are left out.
+    """Return the largest force in each of `DIRECTIONS` sectors around the origin, as a closed curve without empty sectors.
 
-    `F_x`, `F_y` (N): arrays of one shape. Returned are forces that are among them, not sectors' middles.
+    `F_x`, `F_y` (N): arrays of one shape. The returned forces are among them, not at the middles of the sectors.
     """
     F_x, F_y = np.ravel(F_x), np.ravel(F_y)
     sector = np.floor(DIRECTIONS * (np.arctan2(F_y, F_x) / (2 * np.pi) + 0.5)).astype(int) % DIRECTIONS
-    # The last of equal sectors wins, so the greatest force comes last.
+    # The last entry of a sector wins, so the largest force comes last.
     order = np.argsort(np.hypot(F_x, F_y), kind="stable")
     greatest = dict(zip(sector[order].tolist(), order.tolist(), strict=True))
     at = [greatest[one] for one in sorted(greatest)]
@@ -87,7 +87,7 @@ def limit(F_x: Any, F_y: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def ellipse(F_x: Any, F_y: Any) -> tuple[np.ndarray, np.ndarray]:
-    """The ellipse, in four quarters, through the peaks of F_x and F_y (N) of either sign."""
+    """Return the ellipse, in four quarters, through the peaks of F_x and F_y (N) of either sign."""
     turn = np.linspace(0.0, 2 * np.pi, 4 * POINTS)
     x, y = np.cos(turn), np.sin(turn)
     return np.where(x > 0, np.max(F_x), -np.min(F_x)) * x, np.where(y > 0, np.max(F_y), -np.min(F_y)) * y
@@ -99,12 +99,12 @@ def _label(index: int, angle: float) -> str:
 
 
 def _dense_at_zero() -> np.ndarray:
-    """From -1 to 1, denser at zero."""
+    """Return points from -1 to 1, denser at zero."""
     return np.sinh(BEND * np.linspace(-1.0, 1.0, POINTS)) / np.sinh(BEND)
 
 
 def _square_grid(ax: Any, reach: float) -> None:
-    """The same ticks both ways; left to themselves they differ, and squares look like rectangles."""
+    """Set the same ticks on both axes, so that squares of the grid look like squares."""
     from matplotlib.ticker import MaxNLocator, MultipleLocator
 
     low, high = MaxNLocator(10, steps=[1, 2, 5, 10]).tick_values(-reach, reach)[:2]

@@ -1,4 +1,4 @@
-"""Where a tyre answers: slopes of its forces over slip angle and slip ratio, and where each coefficient is seen."""
+"""Maps of a tyre over slip angle and slip ratio: slopes of its forces, and their sensitivities to each coefficient."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ POINTS = 121
 COLUMNS = 2
 COLOUR_MAP = "RdBu_r"
 SHARES = (-0.5, 0.5)
-"""Contours, as shares of a map's greatest value."""
+"""Contours, as shares of a map's largest value."""
 
 PEAK = "peak"
-"""Where a slope is zero."""
+"""The label of the contour where a slope is zero."""
 
 UNSEEN = "seen in neither force"
 ROUNDING = 1e-4
 
 
 class Map(NamedTuple):
-    """One panel: its title, the colour bar's label, `values` (slip ratios, slip angles), what their zero is called."""
+    """One panel: its `title`, the `label` of the colour bar, `values` (slip ratios, slip angles), the label of their `zero`."""
 
     title: str
     label: str
@@ -46,16 +46,16 @@ def gradient_map(
     slip_ratio: float = SLIP_RATIO,
     figure: Any = None,
 ) -> Any:
-    """Maps over slip angle (up to `slip_angle`, rad) and slip ratio (up to `slip_ratio`), in either sense, at `load` (N).
+    """Draw maps over slip angle (up to `slip_angle`, rad) and slip ratio (up to `slip_ratio`) of either sign, at `load` (N).
 
     The first two are the slopes of the longitudinal force over slip ratio and of the lateral force over slip angle: beyond
     their thick line, where they are zero, more slip gives less force. For each coefficient that `where` picks, such as
-    `lambda tyre: (tyre.B, tyre.D)`, follow the sensitivities of both forces to it, times the coefficient (times its declared
-    scale where it is zero), in N: where the map is white, no measurement tells of it. A force that does not know the
-    coefficient has no panel. Thin lines are at half the greatest value; blue is negative, red positive.
+    `lambda tyre: (tyre.B, tyre.D)`, the sensitivities of both forces to it follow, times the coefficient (times its declared
+    scale if it is zero), in N: where a map is white, measurements have no information about it. A force that does not depend on
+    the coefficient has no panel. Thin lines are at half the largest value; blue is negative, red positive.
 
-    `law`: a tyre without states; `figure`: where to draw. **Returns** the figure. **Raises** `InputError` for a load or a
-    range of slip that is not positive, or where `where` picks something else than leaves.
+    `law`: a tyre without states; `figure`: the figure to draw into. **Returns** the figure. **Raises** `InputError` for a load or
+    a range of slip that is not positive, or if `where` picks something that is not a leaf.
     """
     check_positive("load", load, "N")
     check_positive("slip_angle", slip_angle, "rad")
@@ -82,7 +82,7 @@ def gradient_map(
 
 
 def slopes(law: AbstractTyre, contact: Contact) -> list[Map]:
-    """dF_x/dkappa in kN/% and dF_y/dalpha in kN/° at contacts; only of forces that the law has."""
+    """Return dF_x/dkappa in kN/% and dF_y/dalpha in kN/° at contacts, for the forces that the law has."""
     none = _zeros(contact)
     along, _ = _derivatives(law, contact, d_contact=none._replace(slip_ratio=jnp.ones_like(none.slip_ratio)))
     _, across = _derivatives(law, contact, d_contact=none._replace(slip_angle=jnp.ones_like(none.slip_angle)))
@@ -94,14 +94,14 @@ def slopes(law: AbstractTyre, contact: Contact) -> list[Map]:
 
 
 def sensitivities(law: AbstractTyre, contact: Contact, parameter: Parameter) -> list[Map]:
-    """Coefficient times the slope of each force over it, N; only of forces that know it, else one empty map."""
+    """Return the coefficient times the slope of each force over it, N, for forces that depend on it, else one empty map."""
     (leaf,) = pick(law, (parameter,))
     if jnp.ndim(leaf):
         raise InputError(f"{parameter.name} has shape {jnp.shape(leaf)}: must be a scalar to be shown over slips.")
     value = float(leaf)
     amount = value if value else abs(parameter.scale or 1.0)
     found = _derivatives(law, contact, put(_zeros(law), (parameter,), [jnp.asarray(amount, leaf.dtype)]))
-    # Names may be long: the colour bar says p, the title which p.
+    # Names may be long: the colour bar has p, and the title defines p.
     by = "p" if value else f"{amount:g}"
     maps = [
         Map(f"{force}, p = {parameter.name}", f"{by} d{force}/dp [N]", values)
@@ -112,14 +112,14 @@ def sensitivities(law: AbstractTyre, contact: Contact, parameter: Parameter) -> 
 
 
 def _grid(angle: np.ndarray, ratio: np.ndarray, load: float) -> Contact:
-    """Contacts (slip ratios, slip angles), each as large as the grid."""
+    """Return contacts (slip ratios, slip angles) on the grid."""
     angles, ratios = np.meshgrid(angle, ratio)
     wide = lambda values: jnp.asarray(values, float)
     return Contact(slip_angle=wide(angles), slip_ratio=wide(ratios), load=wide(np.full(angles.shape, load)))
 
 
 def _zeros(tree: Any) -> Any:
-    """Tangents that are all zero, None where there is nothing to differentiate."""
+    """Return zero tangents, None for leaves without a derivative."""
     return jax.tree.map(jnp.zeros_like, eqx.filter(tree, eqx.is_inexact_array))
 
 
@@ -133,11 +133,11 @@ def _force_derivative(law: AbstractTyre, contact: Contact, d_law: Any, d_contact
 
 
 def _derivatives(law: AbstractTyre, contact: Contact, d_law: Any = None, d_contact: Any = None) -> list[np.ndarray]:
-    """Derivatives of F_x and F_y in a direction of the law and the contact (None: zero), one program for all directions."""
+    """Return derivatives of F_x and F_y in a direction of law and contact (None: zero), by one program for all directions."""
     shape = np.shape(contact.slip_angle)
     d_law = _zeros(law) if d_law is None else d_law
     d_contact = _zeros(contact) if d_contact is None else d_contact
-    # A force that a law does not have is a Python number, and has no derivative.
+    # A force that a law does not have is a Python number without a derivative.
     found = [0.0 if one is None else one for one in _force_derivative(law, contact, d_law, d_contact)]
     return [np.broadcast_to(np.asarray(one, np.float64), shape) for one in found]
 
@@ -153,7 +153,7 @@ def _draw(figure: Any, ax: Any, degrees: np.ndarray, percent: np.ndarray, one: M
         degrees, percent, one.values, cmap=COLOUR_MAP, vmin=-reach, vmax=reach, shading="gouraud", rasterized=True
     )
     ax.contour(degrees, percent, one.values, [share * reach for share in SHARES], colors="#444444", linewidths=0.6)
-    # A force that only saturates has a slope of zero up to rounding, of either sign: that is no line.
+    # A force that only saturates has a slope of zero up to rounding, of either sign, and gets no line.
     if one.zero and one.values.min() < -ROUNDING * reach:
         line = ax.contour(degrees, percent, one.values, [0.0], colors="#000000", linewidths=1.2)
         ax.clabel(line, fmt=one.zero)

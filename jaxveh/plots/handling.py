@@ -21,11 +21,11 @@ def handling_diagram(
     linear: float = kit.LINEAR_A_Y,
     figure: Any = None,
 ) -> Any:
-    """Steer and sideslip over lateral acceleration of one drive, or of several by label.
+    """Draw steer and sideslip over lateral acceleration of one drive, or of several by label.
 
-    The drives must be quasi-steady: a slow ramp of steer, a circle at slowly rising speed. With the `wheelbase` (m, or one by
-    label) the steer is shown less the geometric one, wheelbase times curvature, and the understeer gradient in the linear
-    range (|a_y| up to `linear`, m/s^2) is drawn and written in degrees per m/s^2 at the road wheels.
+    The drives must be quasi-steady, such as a slow ramp of steer, or a circle at slowly rising speed. With the `wheelbase` (m, or
+    one by label) the geometric steer, wheelbase times curvature, is subtracted from the steer, and the understeer gradient in the
+    linear range (|a_y| up to `linear`, m/s^2) is drawn and written in degrees per m/s^2 at the road wheels.
 
     **Returns** the figure. **Raises** `InputError` for missing channels, no recording, or a range of a_y that is too small.
     """
@@ -54,7 +54,7 @@ def handling_diagram(
 
 
 def _one(axes: Any, turns: SteadyTurns, label: str, shade: str, linear: float) -> str:
-    """The lines of one drive, and what its gradient is in words."""
+    """Draw the lines of one drive, and return its gradient in words."""
     steer = turns.steer if turns.geometric_steer is None else turns.steer - turns.geometric_steer
     axes[0].plot(turns.a_y, np.degrees(steer), color=shade, linewidth=1.4, label=label)
     axes[1].plot(turns.a_y, np.degrees(turns.sideslip), color=shade, linewidth=1.4, label=label)
@@ -71,6 +71,6 @@ def _one(axes: Any, turns: SteadyTurns, label: str, shade: str, linear: float) -
 
 
 def _make_room(ax: Any) -> None:
-    """Words stand in the upper left corner: leave it free of lines."""
+    """Make room for the text in the upper left corner."""
     low, high = ax.get_ylim()
     ax.set_ylim(low, high + 0.15 * (high - low))

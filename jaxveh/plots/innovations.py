@@ -1,4 +1,4 @@
-"""Whether a filter's spreads fit what it met: normalised innovations squared over time, and their correlation from row to row."""
+"""The consistency of a filter's innovations: normalised innovations squared over time, and their correlation over lags."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from jaxveh.plots.style import COLOURS, CYCLE, label_above, legend, new_figure, 
 
 FAINT = "#9a9a9a"
 LOWEST, HIGHEST = 1e-3, 1e2
-"""Between which normalised innovations squared are shown, at most."""
+"""The range in which normalised innovations squared are shown."""
 
 
 class InnovationPoints(NamedTuple):
-    """Of one measured channel, `name`, of T rows: normalised innovations squared, and their correlation from row to row.
+    """Normalised innovations squared of one measured channel, `name`, over T rows, and their correlation over lags.
 
-    `time` (s) and `squared` (T,), NaN where nothing was measured; `mean` (T,), over `seconds` around a row, NaN where less than
-    half of them was measured, and `low`, `high`: between which 95 % of such means are, if the spreads are right; `by_row`,
-    `by_sums`: means of squares and of `slow_squares`; both 1 where all is right. `lag` (L,), s, `correlation` and `band` (L,): of
-    normalised innovations so much later, and what 95 % stay within, if they are white.
+    `time` (s) and `squared` (T,), NaN without a measurement; `mean` (T,), over `seconds` around a row, NaN where less than half
+    of its rows have a measurement; `low`, `high`: the band of 95 % of such means if the standard deviations are right; `by_row`,
+    `by_sums`: means of squares and of `slow_squares`; both are 1 if all is right. `lag` (L,), s, `correlation` and `band` (L,):
+    of normalised innovations at that lag, and the band of 95 % of them if they are white.
     """
 
     name: str
@@ -39,15 +39,16 @@ class InnovationPoints(NamedTuple):
 
 
 def innovations(estimate: Any, *, seconds: float = 1.0, lags: int = 100, figure: Any = None) -> Any:
-    """A row a measured channel: its normalised innovation squared over time, with the mean over `seconds` and the band of 95 %
-    that the mean of a filter with right spreads stays within; on the right its correlation from row to row, with the band of
-    white innovations.
+    """Draw a row per measured channel: its normalised innovation squared over time, and on the right its correlation over lags.
 
-    Beside the mean square of rows stands that of sums over `seconds` (`slow_squares`): measurement errors that last for many
-    rows, as behind a low-pass, are modelled as white noise that is larger row by row, and show as small squares, correlated,
-    whose sums are right.
+    The mean over `seconds` is drawn with the band that contains 95 % of such means if the filter's standard deviations are
+    right, the correlation with the band of white innovations.
 
-    **Arguments**: as `innovation_points`. `figure`: where to draw. **Returns** the figure.
+    The mean square of sums over `seconds` (`slow_squares`) is written beside that of rows: measurement errors that last for many
+    rows, as after a low-pass, are modelled as white noise that is larger in each row, and give small, correlated squares whose
+    sums are right.
+
+    **Arguments**: as `innovation_points`. `figure`: the figure to draw into. **Returns** the figure.
     """
     channels = innovation_points(estimate, seconds=seconds, lags=lags)
     with style():
@@ -63,10 +64,10 @@ def innovations(estimate: Any, *, seconds: float = 1.0, lags: int = 100, figure:
 
 
 def innovation_points(estimate: Any, *, seconds: float = 1.0, lags: int = 100) -> tuple[InnovationPoints, ...]:
-    """What `innovations` draws, a measured channel each.
+    """Return the data of `innovations`, one entry per measured channel.
 
-    **Arguments**: `estimate`: an `Estimate`, or a smoother's, whose filter is looked at. `lags`: rows, at most a quarter of the
-    log. **Raises** `InputError` where nothing was measured, or spreads are not finite.
+    **Arguments**: `estimate`: an `Estimate`, or that of a smoother, whose filter is used. `lags`: rows, at most a quarter of the
+    log. **Raises** `InputError` if there is no measurement, or standard deviations are not finite.
     """
     check_positive("seconds", seconds, "s")
     filtered = getattr(estimate, "filtered", estimate)
@@ -90,7 +91,7 @@ def innovation_points(estimate: Any, *, seconds: float = 1.0, lags: int = 100) -
 
 
 def _running_mean(values: np.ndarray, width: int) -> np.ndarray:
-    """Over `width` rows, NaN where less than half of them are known."""
+    """Return the mean over `width` rows, NaN where less than half of them are known."""
     known = np.isfinite(values)
     count = np.convolve(known, np.ones(width), "same")
     total = np.convolve(np.where(known, values, 0.0), np.ones(width), "same")
@@ -98,14 +99,12 @@ def _running_mean(values: np.ndarray, width: int) -> np.ndarray:
 
 
 def _squared(ax: Any, one: InnovationPoints) -> None:
-    """One channel's normalised innovations squared, on a scale of powers of ten."""
+    """Draw one channel's normalised innovations squared, on a logarithmic scale."""
     known = np.isfinite(one.squared)
     ax.plot(
         one.time[known], np.clip(one.squared[known], LOWEST, HIGHEST), ".", color=FAINT, markersize=1.2, label="a row"
     )
-    ax.axhspan(
-        one.low, one.high, color=CYCLE[2], alpha=0.2, linewidth=0, label="95 % of means, if the spreads are right"
-    )
+    ax.axhspan(one.low, one.high, color=CYCLE[2], alpha=0.2, linewidth=0, label="95 % of means of a consistent filter")
     mean = np.clip(one.mean, LOWEST, HIGHEST)
     ax.plot(one.time, mean, color=CYCLE[0], linewidth=1.2, label=f"mean over {one.seconds:g} s")
     ax.axhline(1.0, color=COLOURS["truth"], linewidth=0.8)
@@ -116,7 +115,7 @@ def _squared(ax: Any, one: InnovationPoints) -> None:
 
 
 def _correlation(ax: Any, one: InnovationPoints) -> None:
-    """One channel's correlation with itself so many rows later."""
+    """Draw one channel's correlation with itself over lags."""
     ax.fill_between(one.lag, -one.band, one.band, color=CYCLE[2], alpha=0.2, linewidth=0)
     ax.vlines(one.lag, 0.0, one.correlation, color=CYCLE[0], linewidth=1.3)
     ax.axhline(0.0, color=COLOURS["truth"], linewidth=0.8)
@@ -127,8 +126,11 @@ def _correlation(ax: Any, one: InnovationPoints) -> None:
 
 
 def slow_squares(white: np.ndarray, width: int) -> float:
-    """The mean square of the sums of `width` rows' normalised innovations (T,), over their number: 1 if they are white and of
-    unit variance, more where errors last for many rows. NaN without a whole part."""
+    """Return the mean square of the sums of normalised innovations (T,) over `width` rows, divided by their number.
+
+    It is 1 if they are white with unit variance, and more if errors last for many rows. It is NaN if no part of `width` rows
+    has enough of them.
+    """
     count = white.size // width
     parts = np.nan_to_num(white[: count * width]).reshape(count, width)
     known = np.isfinite(white[: count * width]).reshape(count, width).sum(axis=1)
@@ -137,6 +139,6 @@ def slow_squares(white: np.ndarray, width: int) -> float:
 
 
 def _write(ax: Any, text: str) -> None:
-    """Numbers of a panel, in its upper right corner."""
+    """Write the numbers of a panel into its upper right corner."""
     box = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1.5}
     ax.text(0.99, 0.97, text, transform=ax.transAxes, ha="right", va="top", fontsize=8, color="#444444", bbox=box)

@@ -1,4 +1,4 @@
-"""What those who draw further figures build with."""
+"""Tools for further figures."""
 
 from jaxveh.plots.figure import Figure
 from jaxveh.plots.style import CYCLE, PAGE_WIDTH, SHADE

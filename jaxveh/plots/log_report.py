@@ -1,4 +1,4 @@
-"""One page of what became of a car's logs: tables, and charts that one can zoom into."""
+"""One page about the logs of a car: tables, and zoomable charts."""
 
 from __future__ import annotations
 
@@ -15,9 +15,12 @@ from jaxveh.plots.report_page import ReportTable
 
 
 class ReportedLog(NamedTuple):
-    """One log of a report: its `name`; `estimate`, of sideslip, and `recording` with the same T rows; `truth`: names to (T,),
-    None without; `others`: labels to such, as in `plots.estimate`; `axle`: of `plots.rear_axle_points`, None without;
-    `innovations`: of `plots.innovation_points`; `tables`, which stand before its charts."""
+    """One log of a report.
+
+    `name`: its name; `estimate`: of sideslip, and `recording`: with the same T rows; `truth`: names to (T,), None if there is
+    none; `others`: labels to such mappings, as in `plots.estimate`; `axle`: of `plots.rear_axle_points`, None if there is none;
+    `innovations`: of `plots.innovation_points`; `tables`: the tables before its charts.
+    """
 
     name: str
     estimate: Any
@@ -30,13 +33,14 @@ class ReportedLog(NamedTuple):
 
 
 def log_report(logs: Sequence[ReportedLog], *, title: str = "Sideslip", tables: Sequence[ReportTable] = ()) -> str:
-    """The text of a page of HTML that holds all that it needs, and opens without a network: `tables`, then for each log its own
-    tables and charts of the estimate with bands of 50 and 95 %, the error, the channels, all over one time, the rear axle's
-    curve, and the filter's innovations; Bokeh is the extra `report`.
+    """Return the text of a self-contained HTML page that opens without a network; Bokeh is the extra `report`.
 
-    Charts of more than `report_charts.MOST_ROWS` rows show each so manieth, and say so. Values are held in single precision.
+    It has `tables`, then for each log its own tables, charts over one time of the estimate with bands of 50 and 95 %, of the
+    error and of the channels, the rear axle's curve, and the filter's innovations.
 
-    **Raises** `InputError` without a log, where rows do not agree, or where Bokeh is missing.
+    Charts of more than `report_charts.MOST_ROWS` rows show only every k-th row, with a note. Values are in single precision.
+
+    **Raises** `InputError` if there is no log, rows do not agree, or Bokeh is missing.
     """
     require_bokeh()
     from bokeh.embed import components
@@ -68,7 +72,7 @@ def log_report(logs: Sequence[ReportedLog], *, title: str = "Sideslip", tables: 
 
 
 def _section(log: ReportedLog, index: int, places: Mapping[str, str]) -> list[str]:
-    """A log's part of the page."""
+    """Return a log's part of the page."""
     step = row_step(len(log.recording))
     thinned = "" if step == 1 else f" The charts show one row in {step} of {len(log.recording)}; the tables are of all."
     parts = [
@@ -76,21 +80,21 @@ def _section(log: ReportedLog, index: int, places: Mapping[str, str]) -> list[st
         *[html.table(one) for one in log.tables],
         "<h3>Estimate and channels over time</h3>",
         html.note(
-            "Drag over a chart to zoom all of them in time; the buttons on the right take it back. A click in a legend hides a "
+            "Drag over a chart to zoom all of them in time; the buttons on the right undo it. A click in a legend hides a "
             f"line.{thinned}"
         ),
         places[f"time-{index}"],
     ]
     if f"axle-{index}" in places:
-        parts += ["<h3>Rear axle: the curve and the points visited</h3>", places[f"axle-{index}"]]
+        parts += ["<h3>Rear axle: the curve and the visited points</h3>", places[f"axle-{index}"]]
     if log.innovations:
         parts += [
-            "<h3>Innovations: whether the filter's spreads fit what it met</h3>",
+            "<h3>Innovations: whether the filter's standard deviations fit the measurements</h3>",
             html.note(
-                "What the measurements say less what the filter expected, over the spread that it expected. Squared it is 1 on "
-                "average where spreads are right: row by row, or, where errors last for many rows and the filter takes them for "
-                "white noise that is larger, by sums (rows then say less than 1, and are correlated). Times far above the band "
-                "are those to look at in the charts above."
+                "The measurements less their predictions, over the predicted standard deviations. The squares are 1 on average "
+                "if the standard deviations are right: by row, or, if errors last for many rows and the filter models them as "
+                "larger white noise, by sums (rows then have less than 1, and are correlated). Look at the times far above the "
+                "band in the charts above."
             ),
             *[places[f"innovation-{index}-{k}"] for k in range(len(log.innovations))],
         ]

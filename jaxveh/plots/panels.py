@@ -20,24 +20,24 @@ WHEEL_STYLE = {
     "rl": {"color": CYCLE[1], "linestyle": "-"},
     "rr": {"color": CYCLE[1], "linestyle": (0, (4, 2))},
 }
-"""A colour an axle, dashes on the right."""
+"""One colour per axle, and dashes for the right wheels."""
 
 GREY = "#666666"
 
 
 def display_of(name: str) -> Quantity:
-    """How a quantity of a drive is shown: units are those that the package gives it."""
+    """Return label and unit of a quantity of a drive, with the package's units."""
     return quantity(name)
 
 
 def values(recording: Recording, name: str) -> np.ndarray:
-    """A channel in the unit of its axis."""
+    """Return a channel in the unit of its axis."""
     taken = drive_channels.sideslip(recording) if name == "sideslip" else drive_channels.channel(recording, name)
     return display_of(name).show(taken)
 
 
 def stack(figure: Any, count: int, each: float = 1.35) -> tuple[Any, np.ndarray]:
-    """A figure (or the one given) with `count` panels over the same time, the last with the time's label."""
+    """Return a figure (the given one, if any) with `count` panels over the same time, the last with the time's label."""
     figure = new_figure(0.75 + each * count) if figure is None else figure
     axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
     axes[-1].set_xlabel("time [s]")
@@ -45,7 +45,7 @@ def stack(figure: Any, count: int, each: float = 1.35) -> tuple[Any, np.ndarray]
 
 
 def line(ax: Any, recording: Recording, name: str, **style: Any) -> None:
-    """One channel over time, with its label above."""
+    """Draw one channel over time, with its label above."""
     ax.plot(
         drive_channels.seconds(recording), values(recording, name), **{"color": CYCLE[0], "linewidth": 1.2, **style}
     )
@@ -53,7 +53,7 @@ def line(ax: Any, recording: Recording, name: str, **style: Any) -> None:
 
 
 def wheels(ax: Any, recording: Recording, prefix: str, factor: Any, label: str) -> None:
-    """A channel of each wheel over time, times a factor (a number, or one by wheel)."""
+    """Draw a channel of each wheel over time, times a factor (a number, or one by wheel)."""
     time = drive_channels.seconds(recording)
     for wheel, words in WHEELS.items():
         scale = factor[wheel] if isinstance(factor, dict) else factor
@@ -68,12 +68,12 @@ def has_wheels(recording: Recording, prefix: str) -> bool:
 
 
 def note(ax: Any, text: str) -> None:
-    """Numbers that belong to a panel, above it on the right, where no line runs."""
+    """Write the numbers of a panel above it on the right, where there is no line."""
     ax.set_title(text.replace("-", "\N{MINUS SIGN}"), loc="right", fontweight="normal", fontsize=8, color=GREY, pad=3.0)
 
 
 def round_number(value: float) -> float:
-    """The number 1, 2 or 5 times a power of ten at or below `value`."""
+    """Return the number 1, 2 or 5 times a power of ten at or below `value`."""
     power = 10.0 ** math.floor(math.log10(value))
     return max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-9)) * power
 
@@ -82,7 +82,7 @@ OVERVIEW = ("steer", "v_x", "yaw_rate", "a_y", "sideslip")
 
 
 def overview(recording: Recording, *, figure: Any = None) -> Any:
-    """What a car does: steer, speed, yaw rate, lateral acceleration, sideslip, as far as the recording has them."""
+    """Draw the motion of a car: steer, speed, yaw rate, lateral acceleration, sideslip, as far as the recording has them."""
     with style():
         names = [name for name in OVERVIEW if _there(recording, name)]
         figure, axes = stack(figure, len(names), 1.1)

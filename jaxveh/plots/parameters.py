@@ -21,11 +21,11 @@ def parameters(
     scale: Mapping[str, Any],
     figure: Any = None,
 ) -> Any:
-    """A row a parameter, a dot an estimator: its deviation from the truth in prior standard deviations, with 95 % bars.
+    """Draw each estimator's deviation from the truth, a row per parameter, in prior standard deviations with 95 % bars.
 
-    **Arguments**, each a number by a parameter's name (`front.B`), such as the `Parameters` of a fit or the last row of an
-    estimate's: `truth`; `mean`, `std`: of each estimator by its label; `scale`: the prior's standard deviations, positive.
-    `figure`: where to draw.
+    **Arguments**, each a number by a parameter's name (`front.B`), such as the `Parameters` of a fit or the last row of those
+    of an estimate: `truth`; `mean`, `std`: of each estimator by its label; `scale`: the prior's standard deviations, positive.
+    `figure`: the figure to draw into.
 
     **Returns** the figure. **Raises** `InputError` for names that do not agree.
     """
@@ -59,7 +59,7 @@ def parameters(
 
 
 def _numbers(what: str, values: Mapping[str, Any], names: tuple[str, ...]) -> np.ndarray:
-    """The numbers (p,) of these names, and of no others."""
+    """Return the numbers (p,) of these names; raise `InputError` for other or missing names."""
     check_names(f"plots.parameters: {what}", values, names)
     missing = [name for name in names if name not in values]
     if missing:

@@ -1,4 +1,4 @@
-"""How quantities are shown: their words, the unit a reader thinks in, and the factor from SI."""
+"""The display of quantities: their names, the usual unit, and the factor from SI."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ _UNITS = {
 
 
 class Quantity(NamedTuple):
-    """`label` with unit for an axis; shown value = `factor` times the SI value."""
+    """The display of a quantity: `label` with unit for an axis; displayed value = `factor` times the SI value."""
 
     label: str
     unit: str
     factor: float
 
     def show(self, values: Any) -> np.ndarray:
-        """Values (any shape) in the shown unit, as NumPy."""
+        """Return values (any shape) in the displayed unit, as NumPy."""
         return np.asarray(values, dtype=np.float64) * self.factor
 
 
 def quantity(name: str, unit: str | None = None) -> Quantity:
-    """How a channel or state is shown; `unit` is its unit in the data (default: the known one)."""
+    """Return the display of a channel or state; `unit` is its unit in the data (default: the known one)."""
     plain = name.removeprefix(TRUTH)
     if unit in (None, "-"):
         unit = canonical_unit(plain) or _UNITS.get(plain, "-")
@@ -65,7 +65,7 @@ def quantity(name: str, unit: str | None = None) -> Quantity:
 
 
 def order(names) -> list[str]:
-    """Names in the order of `io.CANONICAL`, unknown ones last as they come."""
+    """Return names in the order of `io.CANONICAL`, with unknown names last in their own order."""
     place = {name: i for i, name in enumerate(CANONICAL)}
     names = list(names)
     return sorted(names, key=lambda name: place.get(name.removeprefix(TRUTH), len(place) + names.index(name)))

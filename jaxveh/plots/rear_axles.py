@@ -1,4 +1,4 @@
-"""The rear axle as a calibration has it: lateral force over load, over slip angle, with the points that a log visited."""
+"""The rear axle of a calibration: lateral force over load, over slip angle, with the points that a log visited."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from jaxveh.plots.style import COLOURS, CYCLE, legend, new_figure, style
 
 POINTS = 241
 DRAWS = 200
-"""Curves that could as well have been fitted, for the band."""
+"""Number of random curves for the band."""
 EDGE = 0.95
-"""The share of the grip up to which the filter follows the curve: beyond it, a force says no more of the slip angle."""
+"""The share of the grip up to which the filter follows the curve: beyond it a force does not determine the slip angle."""
 TURNING_ALONE = 0.97
-"""The share of its grip that an axle has left for turning, from which on the curve without longitudinal force is its own."""
+"""The share of its grip that an axle has left for turning above which the curve without longitudinal force applies."""
 
 
 class AxlePoints(NamedTuple):
-    """An axle's curve and where a log has been on it.
+    """An axle's curve and the points that a log visited.
 
     `slip` (S,), rad, and `share` (S,), lateral force over load, of the calibrated curve without longitudinal force; `low`, `high`
-    (S,): the band of 95 % that the fitted parameters leave, None without. `visited_slip`, `visited_share` (N,): of the log's
-    rows, and `turning` (N,): whether no more than a little of the grip goes into driving or braking.
+    (S,): the band of 95 % from the uncertainty of the fitted parameters, None if there is none. `visited_slip`, `visited_share`
+    (N,): of the log's rows; `turning` (N,): whether at most a little of the grip is used for driving or braking.
     """
 
     slip: np.ndarray
@@ -42,9 +42,9 @@ class AxlePoints(NamedTuple):
 
 
 def rear_axle(source: Any, estimate: Any, recording: Recording, *, least_speed: float = 3.0, figure: Any = None) -> Any:
-    """The calibrated curve with its band, and the points visited.
+    """Draw the calibrated curve with its band, and the visited points.
 
-    **Arguments**: as `rear_axle_points`. `figure`: where to draw. **Returns** the figure.
+    **Arguments**: as `rear_axle_points`. `figure`: the figure to draw into. **Returns** the figure.
     """
     found = rear_axle_points(source, estimate, recording, least_speed=least_speed)
     with style():
@@ -79,10 +79,10 @@ def rear_axle(source: Any, estimate: Any, recording: Recording, *, least_speed: 
 
 
 def rear_axle_points(source: Any, estimate: Any, recording: Recording, *, least_speed: float = 3.0) -> AxlePoints:
-    """The rear axle's curve and the points visited.
+    """Return the rear axle's curve and the visited points.
 
-    **Arguments**: `source`: a `Calibration` of sideslip, its model, or a car taken at its word. `estimate`: what it made of the
-    `recording` (T rows each). Rows slower than `least_speed` (m/s) are left out.
+    **Arguments**: `source`: a `Calibration` of sideslip, its model, or a car whose values are used. `estimate`: its estimate for
+    the `recording` (T rows each). Rows slower than `least_speed` (m/s) are left out.
     """
     system = estimators.model_of(sideslip.NAME, source, sideslip.model).system
     a_x = np.nan_to_num(np.asarray(recording["a_x"])) if "a_x" in recording else np.zeros(len(recording))
@@ -98,9 +98,11 @@ def rear_axle_points(source: Any, estimate: Any, recording: Recording, *, least_
 
 
 def _curve(system: RearAxle) -> tuple[Any, Any]:
-    """Slip angles (rad) and lateral forces over load up to `EDGE`, (S,) each, without longitudinal force: the system has slip
-    angles over forces."""
-    # Closer together at the grip's edge, where slip angles grow quickly.
+    """Return slip angles (rad) and lateral forces over load up to `EDGE`, (S,) each, without longitudinal force.
+
+    The system gives slip angles as a function of forces.
+    """
+    # The points are denser near the limit of grip, where slip angles grow quickly.
     share = EDGE * system.grip * jnp.sin(jnp.linspace(-jnp.pi / 2, jnp.pi / 2, 4 * POINTS))
     zero = jnp.zeros_like(share)
     load = system.loads(SimpleNamespace(a_x=zero))[1]
@@ -117,12 +119,12 @@ def _curve(system: RearAxle) -> tuple[Any, Any]:
 
 
 def _at(slip: np.ndarray, curve: tuple[Any, Any]) -> np.ndarray:
-    """A curve's forces over load at slip angles (S,), NaN beyond its end."""
+    """Return a curve's forces over load at slip angles (S,), NaN beyond its end."""
     return np.interp(slip, *(np.asarray(values, np.float64) for values in curve), left=np.nan, right=np.nan)
 
 
 def _band(source: Calibration, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What 95 % of the curves that the fit's covariance allows for lie between, (S,) each."""
+    """Return the limits (S,) between which 95 % of the curves lie that are drawn from the fit's covariance."""
     fit = source.fit
     points = np.random.default_rng(0).multivariate_normal(
         np.asarray(fit.unconstrained, np.float64), np.asarray(fit.covariance, np.float64), DRAWS

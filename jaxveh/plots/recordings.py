@@ -14,7 +14,7 @@ from jaxveh.plots.quantities import order, quantity
 from jaxveh.plots.style import COLOURS, CYCLE, SHADE, label_above, legend, new_figure, style
 
 MOST = 12
-"""Panels that fit on a page."""
+"""Largest number of panels on a page."""
 
 
 def recording(
@@ -24,13 +24,13 @@ def recording(
     spans: Sequence[tuple[float, float, str]] = (),
     figure: Any = None,
 ) -> Any:
-    """A panel a channel over the log's own time; a simulation's truth as a black line beneath the measurement.
+    """Draw a panel per channel over the log's own time, with a simulation's truth as a black line behind the measurement.
 
     **Arguments**: `channels`: names to show (default: the first `MOST` that are not `true.`). `spans`: (start, end,
-    label) in seconds to shade, such as a calibration or a finding. `figure`: where to draw. NaN leaves a gap; samples
+    label) in seconds to shade, such as a calibration or a finding. `figure`: the figure to draw into. NaN leaves a gap; samples
     between two gaps are dots.
 
-    **Returns** the figure. **Raises** `InputError` for unknown channels, or nothing to show.
+    **Returns** the figure. **Raises** `InputError` for unknown channels, or if there is no channel.
     """
     names = list(channels) if channels is not None else _default(recording)
     check_names("plots.recording", names, recording.names)
@@ -60,7 +60,7 @@ def _default(recording: Recording) -> list[str]:
 
 
 def _draw_measurement(ax: Any, time: np.ndarray, values: np.ndarray) -> None:
-    """A line, and a dot for each sample that stands between two gaps, where no line would show it (slow devices)."""
+    """Draw a line, and a dot for each sample between two gaps, which a line would not show (slow devices)."""
     known = np.isfinite(values)
     beside = np.r_[False, known[:-1]] | np.r_[known[1:], False]
     ax.plot(time, values, color=CYCLE[0], linewidth=0.9, label="measured")
@@ -70,7 +70,7 @@ def _draw_measurement(ax: Any, time: np.ndarray, values: np.ndarray) -> None:
 
 
 def _mark_silence(ax: Any, time: np.ndarray, values: np.ndarray) -> None:
-    """A channel that never spoke would be an empty panel: say so."""
+    """Write a note into the panel of a channel without samples, which would be empty."""
     if not np.isfinite(values).any():
         ax.set_xlim(time[0], time[-1])
         ax.set_yticks([])

@@ -1,5 +1,4 @@
-"""Charts of a log and its estimate that one can zoom into, made with Bokeh: over one time, the rear axle's curve, and the
-innovations."""
+"""Zoomable charts of a log and its estimate, made with Bokeh: charts over time, the rear axle's curve, and the innovations."""
 
 from __future__ import annotations
 
@@ -19,34 +18,34 @@ from jaxveh.plots.rear_axles import AxlePoints
 from jaxveh.plots.style import COLOURS, CYCLE
 
 MOST_ROWS = 30_000
-"""Rows of a log that a page holds: more than a screen shows, and about 3 MB."""
+"""Largest number of rows of a log on a page: more than a screen shows, and about 3 MB."""
 MOST_POINTS = 6_000
-"""Points of a tyre's curve that a page holds."""
+"""Largest number of points of a tyre's curve on a page."""
 SHOWN = ("sideslip", "v_y")
 TOOLS = "xbox_zoom,box_zoom,xwheel_zoom,xwheel_pan,undo,reset,save"
-"""A drag zooms in time: with a pan among them, Bokeh would take that. The overview's window is there to move."""
+"""Dragging zooms in time; with a pan tool Bokeh would pan instead. The window in the overview moves the view."""
 FREE_TOOLS = "box_zoom,pan,wheel_zoom,undo,reset,save"
-"""Of charts that stand alone."""
+"""The tools of single charts."""
 BANDS = ((BAND, 0.22, "95 % band"), (HALF_BAND, 0.4, "50 % band"))
 CHANNEL = "#444444"
 
 
 def require_bokeh() -> Any:
-    """Bokeh, or an `InputError` that says how to install it."""
+    """Import Bokeh; raise `InputError` with the way to install it if it is missing."""
     return kit.require("bokeh", "writing a report", "report")
 
 
 def row_step(rows: int) -> int:
-    """Each how manieth row is held, so that there are `MOST_ROWS` at most."""
+    """Return k such that every k-th row gives `MOST_ROWS` rows at most."""
     return -(-rows // MOST_ROWS)
 
 
 def time_charts(
     estimate: Any, recording: Recording, truth: Mapping[str, Any] | None, others: Mapping[str, Mapping[str, Any]]
 ) -> Any:
-    """Bokeh's layout of charts over one time (T rows each): estimates with bands, truth and others; errors; the log's channels.
+    """Return Bokeh's layout of charts over one time (T rows each): estimates with bands, truth and others; errors; channels.
 
-    They share what is shown of the time, the cross hair and the tools."""
+    They share the visible time, the cross hair and the tools."""
     require_bokeh()
     from bokeh.layouts import gridplot
     from bokeh.models import CrosshairTool, Range1d, Span
@@ -74,7 +73,7 @@ def time_charts(
 def time_source(
     estimate: Any, recording: Recording, truth: Mapping[str, Any], others: Mapping[str, Mapping[str, Any]]
 ) -> Any:
-    """The columns of the charts in the units that are shown, thinned: time in double, all else in single precision."""
+    """Return the thinned columns of the charts in the displayed units: time in double, all others in single precision."""
     from bokeh.models import ColumnDataSource
 
     step = slice(None, None, row_step(len(recording)))
@@ -121,7 +120,7 @@ def _title(words: str) -> Any:
 
 
 def _edge(centre: str, std: str, width: float) -> Any:
-    """A band's edge, reckoned by the browser from mean and standard deviation."""
+    """Return a band's edge, which the browser computes from mean and standard deviation."""
     from bokeh.models import CustomJSExpr
 
     code = "const m = this.data[centre], s = this.data[std]; return Float64Array.from(m, (v, i) => v + width * s[i])"
@@ -179,12 +178,12 @@ def _channel_chart(name: str, recording: Recording, shared: Mapping[str, Any]) -
 
 
 def _overview(shared: Mapping[str, Any]) -> Any:
-    """The whole log, small, with a window to move over it."""
+    """Return a small chart of the whole log, with a movable window."""
     from bokeh.models import Range1d, RangeTool
     from bokeh.plotting import figure
 
     time = shared["source"].data["time"]
-    label = f"{quantity('sideslip').label}: the window is what is shown below"
+    label = f"{quantity('sideslip').label}: the charts below show the window"
     chart = figure(
         height=80, tools="", x_range=Range1d(time[0], time[-1]), title=_title(label), min_border_left=60, min_border_right=20,
         toolbar_location=None,
@@ -204,7 +203,7 @@ def _hover(chart: Any, drawn: Any, tips: list[tuple[str, str]]) -> None:
 
 
 def _legend(chart: Any) -> None:
-    """Above the chart, where no line runs; a click takes a line away."""
+    """Place the legend above the chart; a click on an entry hides its line."""
     legend = chart.legend[0]
     legend.orientation, legend.location = "horizontal", "left"
     legend.click_policy, legend.border_line_color = "hide", None
@@ -213,7 +212,7 @@ def _legend(chart: Any) -> None:
 
 
 def axle_chart(points: AxlePoints) -> Any:
-    """Bokeh's chart of the rear axle's curve, its band and the points visited, thinned."""
+    """Return Bokeh's chart of the rear axle's curve, its band and the visited points, thinned."""
     require_bokeh()
     from bokeh.plotting import figure
 
@@ -248,7 +247,7 @@ def axle_chart(points: AxlePoints) -> Any:
 
 
 def innovation_charts(points: InnovationPoints) -> Any:
-    """Bokeh's layout of a channel's normalised innovations squared over time, averaged, and their correlation from row to row."""
+    """Return Bokeh's layout of a channel's averaged normalised innovations squared over time, and their correlation over lags."""
     require_bokeh()
     from bokeh.layouts import column
     from bokeh.models import BoxAnnotation

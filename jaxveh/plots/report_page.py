@@ -1,4 +1,4 @@
-"""A page of HTML that needs no other file: headings, tables, charts."""
+"""A self-contained page of HTML: headings, tables, charts."""
 
 from __future__ import annotations
 
@@ -27,12 +27,16 @@ summary { cursor: pointer; color: #0072b2; }
 """
 
 MARKED = ("error", "warning")
-"""Cells of these words are in colour."""
+"""Cells with these words are coloured."""
 
 
 class ReportTable(NamedTuple):
-    """A table of a page: a `title`, the names of its `columns` (none: a list of facts), `rows` of text, a `note` beneath, which
-    columns are `numbers` (their places), to the right, and whether it is `folded` until a click on its title."""
+    """A table of a page.
+
+    `title`: its title; `columns`: their names (none: a list of facts); `rows`: of text; `note`: a line below the table;
+    `numbers`: the indices of columns with numbers, which are aligned to the right; `folded`: whether it is folded until a click
+    on its title.
+    """
 
     title: str
     columns: Sequence[str]
@@ -43,7 +47,7 @@ class ReportTable(NamedTuple):
 
 
 def page(title: str, head: str, parts: Iterable[str]) -> str:
-    """A whole page: `head` goes into its head as it is, `parts` into its body."""
+    """Return a whole page: `head` is inserted into its head unchanged, `parts` into its body."""
     return "\n".join(
         (
             "<!DOCTYPE html>",
@@ -64,23 +68,23 @@ def page(title: str, head: str, parts: Iterable[str]) -> str:
 
 
 def heading(words: str, name: str = "") -> str:
-    """A heading, with a `name` that the page's own links can point to."""
+    """Return a heading, with a `name` as target for links within the page."""
     mark = f' id="{escape(name)}"' if name else ""
     return f"<h2{mark}>{escape(words)}</h2>"
 
 
 def links(names: Sequence[tuple[str, str]]) -> str:
-    """Links within the page: (name of a heading, words)."""
+    """Return links within the page: (name of a heading, words)."""
     return "<nav>" + "".join(f'<a href="#{escape(name)}">{escape(words)}</a>' for name, words in names) + "</nav>"
 
 
 def note(words: str) -> str:
-    """A line of small print."""
+    """Return a line of small print."""
     return f'<p class="note">{escape(words)}</p>' if words else ""
 
 
 def table(one: ReportTable) -> str:
-    """A table with its title and note; one without rows says so by its note alone."""
+    """Return a table with its title and note; a table without rows has only the note."""
     title = f"<h3>{escape(one.title)}</h3>" if one.title else ""
     if not one.rows:
         return title + note(one.note or "None.")

@@ -1,4 +1,4 @@
-"""What a fit to rig data left over: measured and fitted, and residuals over slip and load."""
+"""A fit to rig data: measured and fitted values, and residuals over slip and load."""
 
 from __future__ import annotations
 
@@ -13,23 +13,22 @@ from jaxveh.io import RigTable
 from jaxveh.plots.style import new_figure, style
 
 HEIGHT = 4.3
-"""Inches of a channel's four panels."""
+"""Height of a channel's four panels, inches."""
 
 DOTS = 4000
-"""Rows that are drawn at most, evenly over the data; means and histograms count all."""
+"""Largest number of rows that are drawn, evenly over the data; means and histograms use all."""
 
 GROUPS = 20
-"""Groups of rows whose mean residual is drawn."""
+"""Number of groups of rows whose mean residual is drawn."""
 
 TAIL = 5.0
-"""Standard deviations that the histogram shows."""
+"""Half the width of the histogram, standard deviations."""
 
 COLOUR_MAP = "viridis"
 
 
 class FittedQuantity(NamedTuple):
-    """A channel in words, its unit, the unit in which its values are shown, how many of the first are one of the second,
-    and the slip over which it is drawn where that varies."""
+    """A channel in words, its unit, the displayed unit, the size of the displayed unit, and the slip over which it is drawn."""
 
     title: str
     unit: str
@@ -47,16 +46,17 @@ QUANTITIES = {
 }
 
 SLIPS = {"slip_angle": ("slip angle [°]", np.degrees(1.0)), "slip_ratio": ("slip ratio [%]", 100.0)}
-"""Names of slips on an axis, and what one is there."""
+"""Labels of slips on an axis, and the factors from SI."""
 
 
 def rig_fit(fit: RigFit, rig: RigTable, channels: Sequence[str] | None = None, *, figure: Any = None) -> Any:
-    """How a fit to rig data does, in four panels a channel: measured values (coloured by load) and fitted ones (black) over slip,
-    residuals (fitted less measured) over slip and over load with their mean in groups of rows, and their histogram next to
-    a normal law of the same spread.
+    """Draw a fit to rig data, in four panels per channel.
+
+    They are measured values (coloured by load) and fitted ones (black) over slip, residuals (fitted less measured) over slip and
+    over load with their mean in groups of rows, and their histogram next to a normal law of the same standard deviation.
 
     `fit` of `fitting.fit_rig` and the `rig` that it was given; `channels`: some of the fit's, all by default. A trend in the mean
-    is what the law cannot follow; what is only noise has none. **Returns** the figure; `figure`: where to draw.
+    is a part of the data that the law cannot follow; noise has none. **Returns** the figure; `figure`: the figure to draw into.
 
     **Raises** `InputError` for a channel that was not fitted.
     """
@@ -72,7 +72,7 @@ def rig_fit(fit: RigFit, rig: RigTable, channels: Sequence[str] | None = None, *
 
 
 def slip_of(name: str, rig: RigTable) -> str:
-    """The slip over which a channel is drawn: its own, or the other one where only that varies."""
+    """Return the slip over which a channel is drawn: its own, or the other one if only that varies."""
     own = QUANTITIES[name].slip
     varies = kit.varying_inputs(rig)
     other = "slip_angle" if own == "slip_ratio" else "slip_ratio"
@@ -121,12 +121,12 @@ def _channel(block: Any, name: str, fit: RigFit, rig: RigTable) -> None:
 
 
 def group_means(x: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The mean of x and of residuals in groups of neighbours: one a value where x has few, else as many rows in each."""
+    """Return the mean of x and of residuals in groups of neighbours: one per value if x has few values, else of equal size."""
     order = np.argsort(x, kind="stable")
     x, residual = x[order], residual[order]
     edges = np.flatnonzero(np.diff(x)) + 1
     if len(edges) >= GROUPS:
-        # An edge between equal values goes before all of them; many of pure slip are a group of their own.
+        # An edge between equal values is moved before all of them; many equal values, as in pure slip, are a separate group.
         middle = np.linspace(0, len(x), GROUPS + 1).astype(int)[1:-1]
         first, last = (np.searchsorted(x, x[middle], side) for side in ("left", "right"))
         edges = np.unique(np.concatenate([first, last[last - first > len(x) / GROUPS]]))

@@ -1,4 +1,4 @@
-"""Rig data as they were measured."""
+"""The measurements of rig data."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from jaxveh.plots.style import new_figure, style
 
 
 def rig(rig: RigTable, channels: Sequence[str] | None = None, *, figure: Any = None) -> Any:
-    """A panel a channel: what was measured over its slip, or over the other one where only that varies, coloured by load.
+    """Draw a panel per channel: the measurements over its slip, or over the other slip if only that varies, coloured by load.
 
-    `channels`: some of those that were measured, all by default. **Returns** the figure; `figure`: where to draw.
+    `channels`: some of the measured ones, all by default. **Returns** the figure; `figure`: the figure to draw into.
 
     **Raises** `InputError` for a channel that was not measured.
     """

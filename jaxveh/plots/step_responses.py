@@ -1,4 +1,4 @@
-"""A car's answer to a step of the steering, with the numbers of ISO 7401."""
+"""A car's response to a step of the steering, with the numbers of ISO 7401."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def step_response(
     average: float = 0.5,
     figure: Any = None,
 ) -> Any:
-    """Steer and `outputs` over time; steady value, 90 % and peak are marked, their numbers above each panel.
+    """Draw steer and `outputs` over time; steady value, 90 % and peak are marked, with their numbers above each panel.
 
-    The numbers are those of `jaxveh.diagnostics.step_response` (which see for `average`, s).
+    The numbers are those of `jaxveh.diagnostics.step_response`, which explains `average` (s).
 
-    **Returns** the figure. **Raises** `InputError` where the recording has no such step, or lacks an output.
+    **Returns** the figure. **Raises** `InputError` if the recording has no such step, or an output is missing.
     """
     outputs = list(outputs)
     with style():

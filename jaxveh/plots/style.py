@@ -1,4 +1,4 @@
-"""One style for all figures: colours that colour-blind readers tell apart, thin lines, no frame, units on each axis."""
+"""One style for all figures: colours that colour-blind readers can distinguish, thin lines, no frame, units on each axis."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ COLOURS = {
     "UKF": "#0072b2",
     "MAP": "#d55e00",
 }
-"""Colours by role; what has no role takes `CYCLE` in turn."""
+"""Colours by role; series without a role take those of `CYCLE` in turn."""
 
 CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Colours of series without a role."""
 SHADE = "#f7f1df"
-"""The shade of spans of time."""
+"""The colour of shaded spans of time."""
 
 PAGE_WIDTH = 7.2
-"""Inches: the width of a page's text."""
+"""Width of a page's text, inches."""
 
 DPI = 150
 
 WORDS = 125
-"""Letters of a legend's line that fit on a page's width, the marks before them counted as 7."""
+"""Number of letters of a legend's line that fit on a page's width; each mark counts as 7."""
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
@@ -76,14 +76,14 @@ _RC = {
 
 @contextlib.contextmanager
 def style() -> Iterator[None]:
-    """matplotlib's settings for figures of this package, restored at the end: also for a user's own figures."""
+    """Apply the matplotlib settings of this package's figures, and restore the old ones at the end; also for your own figures."""
     matplotlib = kit.require("matplotlib", "drawing figures", "plot")
     with matplotlib.rc_context(_RC):
         yield
 
 
 def new_figure(height: float, width: float = PAGE_WIDTH) -> Any:
-    """An empty figure of our own class, in inches; needs no window and no pyplot."""
+    """Return an empty figure of this package's class, with size in inches; it needs no window and no pyplot."""
     kit.require("matplotlib", "drawing figures", "plot")
     from jaxveh.plots.figure import Figure
 
@@ -91,15 +91,15 @@ def new_figure(height: float, width: float = PAGE_WIDTH) -> Any:
 
 
 def save(figure: Any, path: str | os.PathLike, *, dpi: int = DPI) -> Path:
-    """Write a figure as `.png`, `.svg` or `.pdf`, all or nothing, replacing an older one; returns the path.
+    """Write a figure as `.png`, `.svg` or `.pdf`, completely or not at all, replacing an older one; return the path.
 
-    **Raises** `InputError` for another suffix, or where the file cannot be written.
+    **Raises** `InputError` for another suffix, or if the file cannot be written.
     """
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: suffix {path.suffix!r}; a figure must end in one of {', '.join(SUFFIXES)}.")
     content = streams.BytesIO()
-    # Without a date the same figure is the same file.
+    # Without a date, equal figures give equal files.
     metadata = {"Software": None} if path.suffix.lower() == ".png" else {"Date": None}
     if path.suffix.lower() == ".pdf":
         metadata = {"CreationDate": None}
@@ -111,19 +111,19 @@ def save(figure: Any, path: str | os.PathLike, *, dpi: int = DPI) -> Path:
 
 
 def colour(name: str, index: int = 0) -> str:
-    """The colour of a role, else the cycle's."""
+    """Return the colour of a role, otherwise the next colour of the cycle."""
     return COLOURS.get(name, CYCLE[index % len(CYCLE)])
 
 
 def legend(figure: Any, axes: Any) -> Any:
-    """One legend for the whole figure above the data, each label once, in the order of drawing; None where there is no label."""
+    """Draw one legend for the whole figure above the data, each label once, in the order of drawing; None without labels."""
     entries: dict[str, Any] = {}
     for ax in _flat(axes):
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     if not entries:
         return None
-    # As many beside each other as the words leave room for; each column is as wide as its longest words.
+    # As many columns as the labels leave room for; each column is as wide as its longest label.
     columns, letters = min(len(entries), 8), [len(label) for label in entries]
     while columns > 1 and sum(max(part) + 7 for part in np.array_split(letters, columns)) > WORDS:
         columns -= 1
@@ -134,7 +134,7 @@ def legend(figure: Any, axes: Any) -> Any:
 
 
 def label_above(ax: Any, label: str) -> None:
-    """What the y axis shows, above the panel: read without turning the head, and low panels have no room beside them."""
+    """Write the label of the y axis above the panel: it is horizontal, and low panels have no room beside them."""
     ax.set_title(label, loc="left", fontweight="normal", pad=3.0)
 
 

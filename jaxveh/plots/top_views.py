@@ -1,4 +1,4 @@
-"""A drive from above: the path, the car on its way, the forces of its tyres, and the cones."""
+"""A drive from above: the path, the car along it, the forces of its tyres, and the cones."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from jaxveh.plots.panels import round_number
 from jaxveh.plots.style import CYCLE, PAGE_WIDTH, SHADE, label_above, new_figure, style
 
 SNAPSHOTS = 12
-"""How often the car is shown, about, unless told."""
+"""Approximate default number of drawn cars."""
 
 MOST_ROWS = 4
 TALL = 4.6
-"""A long and narrow drive is cut along x into rows, as long as they stay within so many inches."""
+"""A long and narrow drive is split along x into rows, as long as they stay within this height in inches."""
 
 BESIDE, BENEATH, EACH = 0.6, 0.95, 0.4
-"""Inches that labels take of the width, the colour's bar and labels of the height, and the ticks of each row."""
+"""Space for labels beside the rows, for labels and colour bar below them, and for the ticks of each row, inches."""
 
 NEAR = 2.0
-"""m: a car that has moved by less is not shown again."""
+"""A car that has moved by less is not drawn again, m."""
 
 FLAT = 0.4
-"""Height over width of the rows below which times stand along their lower edge, clear of arrows."""
+"""Height over width of the rows below which times are written along their lower edge, clear of arrows."""
 
 FORCE = CYCLE[1]
 
@@ -46,14 +46,14 @@ def top_view(
     colour: str = "speed",
     figure: Any = None,
 ) -> Any:
-    """The path over the ground with equal axes, coloured by `"speed"` or `"time"`, and the car on it `every` so many seconds.
+    """Draw the path over the ground with equal axes, coloured by `"speed"` or `"time"`, and the car on it `every` few seconds.
 
-    Arrows at the wheels are the road's forces on the tyres (a single track has them at its axles), with one for scale. With
-    a `course` (`jaxveh.manoeuvres.Course`) its lanes are shaded and its cones shown. `car`: the vehicle whose axles and
-    tracks are drawn; else `wheelbase` and `track` (m), else those of an ordinary passenger car. Overhangs are made up. A drive
-    that is long and narrow is cut along x into rows.
+    Arrows at the wheels are the road's forces on the tyres (at the axles for a single track), with one arrow for scale. With
+    a `course` (`jaxveh.manoeuvres.Course`) its lanes are shaded and its cones drawn. `car`: the vehicle whose axles and
+    tracks are drawn; by default `wheelbase` and `track` (m), otherwise those of an ordinary passenger car. Overhangs are assumed.
+    A long and narrow drive is split along x into rows.
 
-    **Returns** the figure. **Raises** `InputError` where position or yaw is missing, or an argument is out of range.
+    **Returns** the figure. **Raises** `InputError` if position or yaw is missing, or an argument is out of range.
     """
     check_one_of("colour", colour, ("speed", "time"))
     feet = footprint(recording, car, wheelbase, track)
@@ -84,7 +84,7 @@ def top_view(
 
 
 def _snapshots(time: np.ndarray, x: np.ndarray, y: np.ndarray, every: float) -> list[int]:
-    """The rows at which the car is shown; a car that stands is shown once."""
+    """Return the rows at which the car is drawn; a standing car is drawn once."""
     shown: list[int] = []
     for k in np.searchsorted(time, np.arange(time[0], time[-1] + 1e-9, every) - 1e-9):
         if not shown or math.hypot(x[k] - x[shown[-1]], y[k] - y[shown[-1]]) > NEAR:
@@ -93,13 +93,13 @@ def _snapshots(time: np.ndarray, x: np.ndarray, y: np.ndarray, every: float) -> 
 
 
 def top_view_height(recording: Recording, course: Course | None = None) -> float:
-    """Inches of height that the view takes of its own accord."""
+    """Return the natural height of the top view, inches."""
     feet = footprint(recording, None, None, None)
     return _rows(drive_channels.channel(recording, "x"), drive_channels.channel(recording, "y"), course, feet)[1]
 
 
 def _rows(x: np.ndarray, y: np.ndarray, course: Course | None, car: Footprint) -> tuple[list, float]:
-    """The parts of the ground (left, right, low, high; m) that each row shows, and the figure's height in inches."""
+    """Return the part of the ground (left, right, low, high; m) of each row, and the figure's height in inches."""
     margin = max(car.front, car.rear) + 2.0
     left, right = float(np.min(x)) - margin, float(np.max(x)) + margin
     limits = [side for lane in course.lanes for side in (lane.left, lane.right)] if course else []
@@ -136,7 +136,7 @@ def _path(ax: Any, x: np.ndarray, y: np.ndarray, coloured: np.ndarray) -> Any:
     path = LineCollection(list(pieces), cmap="viridis", linewidth=1.8, zorder=1.5)
     path.set_array((coloured[:-1] + coloured[1:]) / 2)
     low, high = float(np.min(coloured)), float(np.max(coloured))
-    # A steady speed is one colour, not the noise in it.
+    # A steady speed has one colour; its noise is not shown.
     if high - low < 0.02 * max(abs(high), 1e-9):
         middle = (low + high) / 2
         low, high = middle - 0.01 * abs(middle), middle + 0.01 * abs(middle)
@@ -145,7 +145,7 @@ def _path(ax: Any, x: np.ndarray, y: np.ndarray, coloured: np.ndarray) -> Any:
 
 
 def _car(ax: Any, recording: Recording, car: Footprint, k: int, every: float) -> None:
-    """Body and wheels at row `k`, and when."""
+    """Draw body and wheels at row `k`, with the time."""
     from matplotlib.patches import Polygon
 
     place, yaw = _place(recording, k)
@@ -173,7 +173,7 @@ def _place(recording: Recording, k: int) -> tuple[np.ndarray, float]:
 
 
 def _metres_per_newton(forces: dict[str, np.ndarray], car: Footprint) -> float:
-    """The greatest force is about as long as the car."""
+    """Return the scale of the arrows: the largest force is about as long as the car."""
     most = max((float(np.max(np.hypot(*force.T))) for force in forces.values()), default=0.0)
     return (car.front + car.rear) / most if most > 0 else 0.0
 
@@ -203,7 +203,7 @@ def _label(figure: Any, axes: Any, path: Any, colour: str, scale: float) -> None
 
 
 def _scale_arrow(ax: Any, newtons: float, scale: float) -> None:
-    """An arrow for scale above the axes on the right, where no car is."""
+    """Draw an arrow for scale above the axes on the right, where there is no car."""
     from matplotlib.transforms import ScaledTranslation
 
     above = ax.transData + ScaledTranslation(0.0, 7 / 72, ax.figure.dpi_scale_trans)

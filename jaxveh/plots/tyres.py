@@ -1,4 +1,4 @@
-"""What a tyre does: forces over slip at several loads, aligning moment, and forces of combined slip."""
+"""The behaviour of a tyre: forces over slip at several loads, aligning moment, and forces in combined slip."""
 
 from __future__ import annotations
 
@@ -17,22 +17,25 @@ POINTS = 181
 SLIP_ANGLE = np.radians(18.0)
 SLIP_RATIO = 0.3
 ROOM = 4 * POINTS
-"""Points of the longest line, for which each is compiled."""
+"""Number of points of the longest line; every line is computed with this many."""
 COMBINED = (1.0, 2.0, 4.0, 10.0)
-"""Degrees of slip angle whose forces of combined slip are drawn."""
+"""Slip angles whose forces in combined slip are drawn, degrees."""
 
 
 LOADS = (2000.0, 4000.0, 6000.0)
-"""N, where nobody says otherwise,"""
+"""Default loads, N."""
 
 SPEED = 16.7
-"""m/s: and the speed, that of most rigs."""
+"""Default speed, m/s: that of most rigs."""
 
 
 def tyre(law: AbstractTyre, loads: Sequence[float] = LOADS, *, speed: float = SPEED, figure: Any = None) -> Any:
-    """Lateral force and aligning moment over slip angle, longitudinal force over slip ratio, at `loads` (N); lateral over
-    longitudinal force at several slip angles, at the middle load; all at a forward `speed` (m/s). A tyre with states of its own
-    has settled. **Returns** the figure; `figure`: where to draw."""
+    """Draw the forces of a tyre over slip, and in combined slip.
+
+    Lateral force and aligning moment over slip angle, and longitudinal force over slip ratio, are at `loads` (N); lateral over
+    longitudinal force is at several slip angles and the middle load; all are at a forward `speed` (m/s). A tyre with states is
+    in its steady state. **Returns** the figure; `figure`: the figure to draw into.
+    """
     angle, ratio = np.linspace(-SLIP_ANGLE, SLIP_ANGLE, POINTS), np.linspace(-SLIP_RATIO, SLIP_RATIO, POINTS)
     with style():
         figure = new_figure(5.2) if figure is None else figure
@@ -63,9 +66,9 @@ def tyre(law: AbstractTyre, loads: Sequence[float] = LOADS, *, speed: float = SP
 
 
 def forces_at(law: AbstractTyre, load: float, slip_angle: Any, slip_ratio: Any, speed: float | None = None) -> Any:
-    """Forces at a load (N) as NumPy arrays of the shape to which slip angles (rad) and slip ratios broadcast."""
+    """Return forces at a load (N) as NumPy arrays of the shape to which slip angles (rad) and slip ratios broadcast."""
     shape = np.broadcast_shapes(np.shape(slip_angle), np.shape(slip_ratio))
-    # Lines of different lengths are one program.
+    # Lines of different lengths use the same compiled program.
     size = (max(ROOM, *shape),) if len(shape) == 1 else shape
     wide = lambda value: jnp.asarray(np.resize(np.broadcast_to(value, shape), size), float)
     settings = {} if speed is None else {"speed": jnp.asarray(speed, float)}

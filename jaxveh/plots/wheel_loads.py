@@ -13,15 +13,15 @@ from jaxveh.plots.panels import WHEELS, has_wheels, line, note, stack, wheels
 from jaxveh.plots.style import CYCLE, SHADE, label_above, legend, style
 
 LIFTED = 0.01
-"""Share of the mean load of all wheels and rows below which a wheel counts as lifted: ours."""
+"""Share of the mean load of all wheels and rows below which a wheel counts as lifted; our choice."""
 
 
 def loads(recording: Recording, *, figure: Any = None) -> Any:
-    """The wheels' loads (of a single track: the axles') and, beneath, the lateral acceleration that shifts them.
+    """Draw the wheel loads (axle loads for a single track) and, below, the accelerations that transfer load.
 
     Spans in which any wheel lifts (below `LIFTED` of the mean load) are shaded.
 
-    **Returns** the figure. **Raises** `InputError` where the recording has no loads.
+    **Returns** the figure. **Raises** `InputError` if the recording has no loads.
     """
     axles = drive_channels.has(recording, "load_front", "load_rear")
     if not has_wheels(recording, "load") and not axles:
@@ -48,7 +48,7 @@ def loads(recording: Recording, *, figure: Any = None) -> Any:
 
 
 def wheel_lift(recording: Recording) -> np.ndarray:
-    """Whether any wheel is off the ground, (T,)."""
+    """Return whether any wheel is off the ground, (T,)."""
     each = np.stack([drive_channels.channel(recording, f"load_{wheel}") for wheel in WHEELS])
     return np.min(each, axis=0) < LIFTED * np.mean(each)
 

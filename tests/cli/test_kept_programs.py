@@ -60,7 +60,7 @@ def test_a_second_start_compiles_nothing_and_after_damage_all_is_compiled_anew(o
     largest.write_bytes(largest.read_bytes()[:500])
     (asked, read, _), said = simulated(tmp_path)
     assert read == asked - 1
-    assert "note: a program kept from an earlier start is damaged" in said and "UserWarning" not in said
+    assert "note: a cached program from an earlier start is damaged" in said and "UserWarning" not in said
     (asked, read, written), said = simulated(tmp_path)
     assert written > 5 and "damaged" not in said
 
@@ -71,7 +71,7 @@ def test_a_program_whose_last_use_was_not_written_is_damage_too(own, tmp_path):
     (folder,) = own.iterdir()
     next(folder.glob("*-atime")).unlink()
     (_, _, written), said = simulated(tmp_path)
-    assert said.count("note: a program kept from an earlier start is damaged") == 1 and "UserWarning" not in said
+    assert said.count("note: a cached program from an earlier start is damaged") == 1 and "UserWarning" not in said
     (_, _, written), said = simulated(tmp_path)
     assert written > 5 and "damaged" not in said
 

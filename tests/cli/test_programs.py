@@ -127,7 +127,7 @@ def test_devices_with_clocks_of_their_own(tmp_path):
     (log := tmp_path / "apart").mkdir()
     result, _ = estimate(log, apart, "--as-told", "--fill", "0.05")
     assert result.exit_code == 0, result.output
-    assert "have clocks of their own: all channels are taken at the rows of yaw_rate" in result.output
+    assert "have separate clocks: all channels are interpolated linearly at the rows of yaw_rate" in result.output
     (together := tmp_path / "together").mkdir()
     assert estimate(together, drive, "--as-told")[0].exit_code == 0
     found, there = (io.read_recording(folder / "estimate.csv") for folder in (log, together))
@@ -193,7 +193,7 @@ def test_a_log_calibrates_itself_unless_told_otherwise(tmp_path, drive):
     result, _ = estimate(tmp_path, drive, "--as-told", "--calibrate", "0:2")
     assert "--as-told fits nothing" in error_line(result)
     result, _ = estimate(tmp_path, drive, "--as-told")
-    assert "the car file is taken at its word: --as-told." in result.output
+    assert "the values of the car file are used: --as-told." in result.output
     folder = tmp_path / "long"
     folder.mkdir()
     often = {name: np.tile(values, 6) for name, values in drive.items()} | {"time": 0.01 * np.arange(2400)}
@@ -244,7 +244,7 @@ def kept(tmp_path_factory):
     result = run("fit", log, "--vehicle", car, "-o", folder / "calibration.toml", *more)
     assert result.exit_code == 0, result.output
     # The sentence names what the table names.
-    assert "says little of" in result.output and "process_noise" not in result.output
+    assert "contain little information about" in result.output and "process_noise" not in result.output
     return folder
 
 
@@ -389,7 +389,7 @@ def test_a_report_is_refused_before_any_work(kept, tmp_path):
     assert run(*start, "--report", there, "--as-told").exit_code == 2
     result = run(*start[:2], "--vehicle", kept / "car.toml", *start[4:], "--as-told", "--report", there, "--force")
     assert result.exit_code == 0, result.output
-    assert "Nothing was fitted: the car file is taken at its word." in there.read_text()
+    assert "Nothing was fitted: the values of the car file are used." in there.read_text()
 
 
 def topics_of(path):
@@ -439,7 +439,7 @@ def test_topics_have_no_stamps_below_zero(kept, tmp_path):
     table = with_steer()
     log = write_log(tmp_path, table | {"time": table["time"] - 1.0})
     start = ("estimate", log, "--calibration", kept / "calibration.toml", "-o")
-    assert "stamps must be at least zero, the log begins at -1 s" in error_line(run(*start, tmp_path / "e.mcap"))
+    assert "stamps must be at least zero, but the log begins at -1 s" in error_line(run(*start, tmp_path / "e.mcap"))
     assert not (tmp_path / "e.mcap").exists()
 
 
@@ -474,8 +474,8 @@ def test_a_calibration_of_another_car_and_options_that_contradict_it(kept, tmp_p
     start = ("estimate", kept / "drive.csv", "--calibration", kept / "calibration.toml", "-o", tmp_path / "e.csv")
     line = error_line(run(*start, "--vehicle", other))
     assert "is of another car: its mass is 1420.0, that of --vehicle 1421.0" in line
-    assert "leave --as-told out" in error_line(run(*start, "--as-told"))
-    assert "leave --calibrate out" in error_line(run(*start, "--calibrate", "0:25"))
+    assert "leave out --as-told" in error_line(run(*start, "--as-told"))
+    assert "leave out --calibrate" in error_line(run(*start, "--calibrate", "0:25"))
     both = (
         "estimate",
         kept / "drive.csv",
@@ -485,7 +485,7 @@ def test_a_calibration_of_another_car_and_options_that_contradict_it(kept, tmp_p
         "-o",
         tmp_path / "both",
     )
-    assert "--calibrate is of one log" in error_line(run(*both, "--calibrate", "0:25"))
+    assert "--calibrate takes one log" in error_line(run(*both, "--calibrate", "0:25"))
     assert "--vehicle is missing" in error_line(run("estimate", kept / "drive.csv", "-o", tmp_path / "e.csv"))
     assert "lies outside the log" in error_line(run(*start, "--span", "100:200"))
 
@@ -567,7 +567,10 @@ def test_reproduce_prints_tables_and_writes_checks(tmp_path, papers):
     assert papers == [("first", {"seeds": 7, "seed": 3})]
     assert "honest first" in result.stdout
     # What stands beside a criterion is shown, and not counted.
-    assert "1 of 2 (1 failed) hold" in result.stdout and "beside it: PF front, redesigned" in result.stdout
+    assert (
+        "original criteria that hold: 1 of 2 (1 failed)" in result.stdout
+        and "beside it: PF front, redesigned" in result.stdout
+    )
     assert "told the noise" in result.stdout and "made later" in result.stdout
     content = read_json(numbers)
     assert content["checks"][0] == {
@@ -624,7 +627,7 @@ def test_a_paper_by_a_program_of_its_own(tmp_path):
 def test_a_log_is_for_the_review_alone(tmp_path, papers):
     assert "belong together" in error_line(run("reproduce", "first", "--log", tmp_path / "log.csv"))
     both = ("--log", tmp_path / "log.csv", "--vehicle", tmp_path / "car.toml")
-    assert "only sideslip-review looks at a log" in error_line(run("reproduce", "first", *both))
+    assert "only sideslip-review uses a log" in error_line(run("reproduce", "first", *both))
 
 
 def test_reproduce_names_its_papers():

@@ -97,11 +97,15 @@ def test_all_gives_what_can_be_had_and_says_why_not(drive):
 def test_what_is_asked_for_wrongly_is_said_in_a_line(drive):
     assert "--what = 'spede': must be one of" in error_line(estimate(drive, "--what", "spede"))
     assert "must be one of" in error_line(estimate(drive, "--what", "speed", "--methods", "guess"))
-    assert "--methods is of one quantity" in error_line(estimate(drive, "--what", "all", "--methods", "all"))
+    assert "--methods applies to one quantity" in error_line(estimate(drive, "--what", "all", "--methods", "all"))
     assert "--truth = 'mass': must be one of" in error_line(estimate(drive, "--what", "speed", "--truth", "mass"))
-    assert "--calibrate: of --what sideslip" in error_line(estimate(drive, "--what", "speed", "--calibrate", "0:5"))
-    assert "--filter: of --what sideslip" in error_line(estimate(drive, "--what", "speed", "--filter", "pf"))
-    assert "--particles: of --what sideslip" in error_line(estimate(drive, "--what", "speed", "--particles", "50"))
+    assert "--calibrate: only for --what sideslip" in error_line(
+        estimate(drive, "--what", "speed", "--calibrate", "0:5")
+    )
+    assert "--filter: only for --what sideslip" in error_line(estimate(drive, "--what", "speed", "--filter", "pf"))
+    assert "--particles: only for --what sideslip" in error_line(
+        estimate(drive, "--what", "speed", "--particles", "50")
+    )
     missing = error_line(estimate(drive, "--what", "speed", "--truth", "true.v_x"))
     assert "has no such channel" in missing
     assert "--vehicle is missing" in error_line(

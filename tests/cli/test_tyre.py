@@ -68,11 +68,11 @@ def test_show_says_what_is_worth_a_look(tmp_path):
     odd = shared("tyres") / "chrono__hmmwv__tire__HMMWV_pacejka.tir"
     result = run("tyre", "show", odd, "--json", tmp_path / "tyre.json")
     assert result.exit_code == 0, result.output
-    assert "Worth a look" in result.stdout and "0.00501 at nominal load" in result.stdout
+    assert "Findings about the file" in result.stdout and "0.00501 at nominal load" in result.stdout
     findings = json.loads((tmp_path / "tyre.json").read_text())["findings"]
     assert findings[0]["about"] == "deflection over radius" and "0.01 to 0.2" in findings[0]["says"]
     quiet = run("tyre", "show", shared("tyres") / "chrono__VW_microbus__json__mf_185_80R14.tir")
-    assert quiet.exit_code == 0 and "Worth a look" not in quiet.stdout
+    assert quiet.exit_code == 0 and "Findings about the file" not in quiet.stdout
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_bad_tables_are_named(tyre_file, table, tmp_path, text, message):
 def test_bad_files_are_named(table, tmp_path):
     other = tmp_path / "other.tir"
     other.write_text("nothing\n")
-    assert "no tyre property file" in error_line(run("tyre", "show", other))
+    assert "not a tyre property file" in error_line(run("tyre", "show", other))
     assert "cannot be read" in error_line(run("tyre", "show", tmp_path / "absent.tir"))
     assert "-o" in error_line(run("tyre", "evaluate", other, table, "-o", tmp_path / "out.txt"))
 

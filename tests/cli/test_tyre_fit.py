@@ -77,9 +77,12 @@ def test_what_the_data_do_not_show_is_said(brush):
     unseen = [name for name, one in numbers["coefficients"].items() if one["mark"] == "not identified"]
     assert unseen == ["slip_stiffness", "half_length"] and numbers["identified_directions"] == 2
     assert numbers["coefficients"]["half_length"]["std"] is None
-    assert "warning: the data tell 2 of 4 directions" in result.stderr
+    assert "warning: the data identify 2 of 4 directions" in result.stderr
     assert "held at their start: slip_stiffness, half_length" in result.stderr
-    assert result.stdout.count("not identified") == 3 and "What is not identified stands at its start" in result.stdout
+    assert (
+        result.stdout.count("not identified") == 3
+        and "Coefficients that are not identified, and those" in result.stdout
+    )
 
 
 def test_residuals_are_drawn(brush):
@@ -153,8 +156,8 @@ def fit_of(*converged, rmse=10.0, validated=11.0, std=0.1, identified=1):
             "0 of 1 directions of the coefficients apart; held at their start: friction",
         ),
         (fit_of(True, rmse=60.0, validated=60.0), "residuals larger than at the start: F_y"),
-        (fit_of(True, validated=21.0), "missed by more than twice the fit's RMSE: F_y"),
-        (fit_of(True, rmse=0.0, validated=0.0), "met to the last digits: F_y"),
+        (fit_of(True, validated=21.0), "errors on rows left out in a fold are more than twice the fit's RMSE: F_y"),
+        (fit_of(True, rmse=0.0, validated=0.0), "fitted to the last digits: F_y"),
     ],
 )
 def test_warnings_are_honest(fit, words):
@@ -167,7 +170,7 @@ def test_a_property_file_tells_its_own_side(tmp_path):
     start = tmp_path / "start.tir"
     io.write_property_file(tyres.to_property_file(tyres.typical_mf_tyre(4e3), side="left"), start)
     line = refused(tmp_path, "--start", start, "--side", "right", product="out.tir")
-    assert "start.tir tells its own side; leave --side out" in line
+    assert "start.tir has its own side; leave --side out" in line
 
 
 def refused(folder, *arguments, data=None, product="out.toml"):
@@ -182,21 +185,21 @@ def refused(folder, *arguments, data=None, product="out.toml"):
     [
         (["--model", "brsh"], "--model = 'brsh': must be one of 'mf61'"),
         (["--model", "mf52"], "suffix '.toml'; it must end in one of .tir"),
-        (["--model", "brush", "--start", "a.tir"], "--start a.tir tells the law; leave one of the two out"),
+        (["--model", "brush", "--start", "a.tir"], "--start a.tir defines the law; leave one of the two out"),
         (["--start", "a.txt"], "--start a.txt: suffix '.txt'; it must end in one of .tir, .toml"),
-        (["--model", "brush", "--side", "left"], "--side left: only a property file (.tir) tells a side"),
+        (["--model", "brush", "--side", "left"], "--side left: only a property file (.tir) has a side"),
         (["--model", "brush", "--measured", "F_q"], "--measured = 'F_q': must be one of 'F_x'"),
         (["--model", "brush", "--measured", ","], "--measured ',': must name one of F_x"),
         (["--model", "brush", "--measured", "F_y,F_x"], "measured: F_x is not in"),
         (["--model", "brush", "--bounds", "friction=1"], "--bounds friction=1: must be NAME=LOW:HIGH, such as"),
-        (["--model", "brush", "--bounds", "friction=2:1"], "--bounds friction=2:1: 2 must lie below 1"),
+        (["--model", "brush", "--bounds", "friction=2:1"], "--bounds friction=2:1: 2 must be less than 1"),
         (["--model", "brush", "--bounds", "mu=0:1"], "bounds: unknown name(s) mu; there are: slip_stiffness"),
         (["--model", "brush", "--bounds", "friction=2:3"], "(2, 3): the start 0.9646"),
         (["--model", "brush", "--weight", "F_y"], "--weight F_y: must be CHANNEL=NUMBER, such as"),
         (["--model", "brush", "--weight", "F_y=-1"], "weights['F_y'] = -1.0: must be positive"),
         (["--model", "brush", "--folds", "1"], "folds = 1: must be at least 2"),
         (["--model", "brush", "--axes", "ours"], "F_y falls with slip_angle"),
-        (["--model", "brush", "--axes", "sae"], "load = -4000 in the median"),
+        (["--model", "brush", "--axes", "sae"], "the median load is -4000"),
         (["--model", "brush", "--free", "PKY4"], "free: unknown name(s) PKY4"),
     ],
 )
@@ -225,7 +228,7 @@ def test_outliers_of_a_consortium_s_file_are_told_and_borne(tmp_path):
     missed = lambda: abs(float(tyres.read_parameters(product).cornering_stiffness) / 7e4 - 1)
     before = missed()
     robust = run("tyre", "fit", data, "--model", "brush", "-o", product, "--robust", "--force")
-    assert robust.exit_code == 0 and "counted little" in robust.stderr
+    assert robust.exit_code == 0 and "had little weight" in robust.stderr
     assert missed() < 0.02 < before
 
 
@@ -238,7 +241,7 @@ def test_odd_signs_are_reported_where_the_user_says_what_tyre_it_is(tmp_path):
 
 def test_the_help_teaches_axes_outliers_and_what_is_held():
     text = " ".join(run("tyre", "fit", "--help").stdout.split())
-    for words in ("adapted-sae", "--robust", "PKY4", "FSAE TTC", "stays at its start"):
+    for words in ("adapted-sae", "--robust", "PKY4", "FSAE TTC", "keep their start values"):
         assert words in text
 
 

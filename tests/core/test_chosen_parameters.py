@@ -151,7 +151,7 @@ def test_bijectors_refuse_what_lies_outside():
     with pytest.raises(InputError, match=r"value = 2\.0: must be inside \(0\.0, 2\.0\)"):
         Interval(0.0, 2.0).inverse(jnp.asarray(2.0))
     for low, high in ((1.0, 1.0), (2.0, 1.0), (0.0, np.inf)):
-        with pytest.raises(InputError, match="low must be below high, both finite"):
+        with pytest.raises(InputError, match="low must be less than high, and both finite"):
             Interval(low, high)
 
 

@@ -437,14 +437,14 @@ def test_what_is_wrong_is_told(made, name, tmp_path):
     other = made("Fit" if type(one) is not fitting.Fit else "Answers")
     other.save(tmp_path / "other.nc")
     with pytest.raises(
-        InputError, match=f"other.nc: must be of {type(one).__name__}, and is one of {type(other).__name__}"
+        InputError, match=f"other.nc: must be of {type(one).__name__}, but is of {type(other).__name__}"
     ):
         type(one).load(tmp_path / "other.nc")
     with pytest.raises(InputError, match=f"{type(one).__name__}.from_xarray: list: must be an xarray.Dataset"):
         type(one).from_xarray([])
     data = other.to_xarray()
     del data.attrs["jaxveh"]
-    with pytest.raises(InputError, match=r"is a stranger's|no coordinate `time`"):
+    with pytest.raises(InputError, match=r"from another program|no coordinate `time`"):
         type(one).from_xarray(data)
 
 

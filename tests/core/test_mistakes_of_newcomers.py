@@ -102,7 +102,7 @@ def test_degrees_in_a_log(drive):
     (lambda car: car.fronts.B, "no attribute 'fronts'.*Did you mean front?"),
     (lambda car: car.front.b, "no attribute 'b'.*Did you mean B?"),
     (lambda car: 3.0, "where picked 3.0: it must pick array leaves"),
-    (lambda car: (car.front.B, car.front.B), "front.B twice: each leaf can be chosen once"),
+    (lambda car: (car.front.B, car.front.B), "front.B twice: each leaf can be chosen only once"),
     ("front.B", r"estimate = 'front.B': must be a function, such as lambda car"),
 ])  # fmt: skip
 def test_a_wrong_where(where, words, car):

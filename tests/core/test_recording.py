@@ -45,7 +45,7 @@ def test_spans_are_half_open_and_in_the_log_s_own_time():
     recording = make()
     np.testing.assert_array_equal(recording.between(0.5, 2.0).time, [0.5, 1.5])
     np.testing.assert_array_equal(recording.rows(slice(1, None, 2))["a"], [2.0, 4.0])
-    with pytest.raises(InputError, match=r"span 5:6: holds no row; the log runs from 0\.0 to 2\.0 s"):
+    with pytest.raises(InputError, match=r"span 5:6: contains no row; the log runs from 0\.0 to 2\.0 s"):
         recording.between(5, 6)
 
 
@@ -79,7 +79,7 @@ def test_fill(method, max_gap, values, filled):
         ),
         (
             lambda: Recording([0.0, 1.0, 1.0], {}),
-            r"Cut them apart where time steps back; else sort the rows and drop repeated stamps",
+            r"Split them where time steps back; otherwise sort the rows and drop repeated time stamps",
         ),
         (lambda: make()["b"], r"unknown name\(s\) b; there are: a, true\.a"),
         (lambda: make().select(["x"]), r"select: unknown name\(s\) x"),

@@ -226,9 +226,9 @@ def test_mistakes_are_named(call, message):
 def test_a_filter_without_nis_says_what_to_take():
     given = estimate()
     given.info = given.info._replace(nis=np.full_like(given.info.nis, np.nan))
-    with pytest.raises(InputError, match="take nis_by_channel"):
+    with pytest.raises(InputError, match="use nis_by_channel"):
         diagnostics.nis(given)
     given.info = given.info._replace(innovation_std=Pair(*np.full((2, 4, 300), np.nan)), whitened=None)
     for of in (diagnostics.nis_by_channel, diagnostics.whiteness):
-        with pytest.raises(InputError, match="a is not finite|a over its predicted spread is not finite"):
+        with pytest.raises(InputError, match="a is not finite|a over its predicted standard deviation is not finite"):
             of(given)

@@ -106,7 +106,7 @@ def test_the_truth_is_looked_at_first_and_gaps_are_bridged():
     log = Recording(rows, {"a_y": gaps, "yaw_rate": 0 * rows, "true.yaw_rate": rows, "v_x": np.full(10, np.nan)})
     np.testing.assert_array_equal(channel(log, "a_y")[:9], rows[:9])
     np.testing.assert_array_equal(channel(log, "yaw_rate"), rows)
-    with pytest.raises(InputError, match="no channel 'steer' to look at; there are: a_y, yaw_rate, v_x"):
+    with pytest.raises(InputError, match="no channel 'steer'; there are: a_y, yaw_rate, v_x"):
         channel(log, "steer")
     with pytest.raises(InputError, match="v_x has no finite sample"):
         channel(log, "v_x")
@@ -359,17 +359,17 @@ def test_peaks_are_of_either_sign_and_loads_of_the_lightest_wheel():
 
 
 BAD = {
-    "no step": (lambda: step_response(Recording(TIME, {"steer": np.sin(TIME), "yaw_rate": TIME})), "no step that is held"),
-    "no steer": (lambda: step_response(Recording(TIME, {"steer": 0 * TIME, "yaw_rate": TIME})), "no step that is held"),
+    "no step": (lambda: step_response(Recording(TIME, {"steer": np.sin(TIME), "yaw_rate": TIME})), "not a step that is held"),
+    "no steer": (lambda: step_response(Recording(TIME, {"steer": 0 * TIME, "yaw_rate": TIME})), "not a step that is held"),
     "average": (lambda: step_response(stepped(lambda t: t), average=0.0), "average = 0.0: must be positive"),
-    "still steer": (lambda: frequency_response(Recording(TIME, {"steer": 0 * TIME, "yaw_rate": TIME})), "does not move"),
+    "still steer": (lambda: frequency_response(Recording(TIME, {"steer": 0 * TIME, "yaw_rate": TIME})), "is constant"),
     "long segment": (lambda: frequency_response(stepped(lambda t: t), segment=60.0), "segment = 60.0: must be at most"),
     "short segment": (lambda: frequency_response(stepped(lambda t: t), segment=0.05), "5 rows"),
     "no wheelbase": (lambda: understeer(steady_turns(turning())), "give `steady_turns` the car's wheelbase"),
     "one turn": (lambda: understeer(steady_turns(turning(0.0), 2.5)), "over too small a range"),
     "wheelbase": (lambda: steady_turns(turning(), -2.5), "wheelbase = -2.5: must be positive"),
-    "no sine": (lambda: sine_with_dwell(stepped(lambda t: t)), "nowhere turns faster than 75 deg/s for 0.2 s"),
-    "held sine": (lambda: sine_with_dwell(dwell_drive().between(0.0, 2.7)), "come back to zero"),
+    "not a sine": (lambda: sine_with_dwell(stepped(lambda t: t)), "never turns faster than 75 deg/s for 0.2 s"),
+    "held sine": (lambda: sine_with_dwell(dwell_drive().between(0.0, 2.7)), "return to zero"),
     "A": (lambda: sine_with_dwell(dwell_drive(), steer_at_03g=0.0), "steer_at_03g = 0.0: must be positive"),
     "displacement": (lambda: sine_with_dwell(dwell_drive(), displacement_limit=-1.0), "displacement_limit = -1.0: must be"),
     "short sine": (lambda: sine_with_dwell(dwell_drive().between(0.0, 4.5)), "drive longer"),

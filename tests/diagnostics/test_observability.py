@@ -59,7 +59,7 @@ def test_a_product_trades_and_the_words_name_both():
 
 def test_a_parameter_without_any_trace():
     found = observability_at(lambda z: 20 * z[:1] * jnp.ones(9), jnp.zeros(2), ("seen", "hidden"), np.ones(2))
-    assert found.trade() == "hidden alone leaves no trace in the measurements"
+    assert found.trade() == "hidden alone has no effect on the measurements"
     assert found.bounds.hidden > 1e100
     np.testing.assert_allclose(found.bounds_with_prior.hidden, 1.0)
     np.testing.assert_allclose(found.bounds.seen, 1 / 60, rtol=1e-9)

@@ -19,7 +19,7 @@ CAR = test_sideslip.CAR
 
 NAMED = {
     "spike": ("warning", ("a_y", "yaw_rate"), "spike"),
-    "stuck": ("warning", ("a_y",), "stands still"),
+    "stuck": ("warning", ("a_y",), "stays constant"),
     "jump": ("warning", ("time",), "clock that jumped"),
     "gap": ("warning", ("a_x, yaw_rate, a_y",), "gap"),
     "km/h": ("error", ("v_x",), "km/h"),

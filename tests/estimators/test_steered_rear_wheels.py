@@ -11,7 +11,9 @@ from jaxveh import InputError, Recording, diagnostics, estimators, vehicles
 from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.estimators.method import TURNING, method_of
 
-REFUSAL = r'steering = "rear": its equations are those of a car whose front wheels alone.*estimators.state_space'
+REFUSAL = (
+    r'steering = "rear", but the equations used here hold only for a car with front steering.*estimators.state_space'
+)
 REAR = dataclasses.replace(method_logs.CAR, steering="rear")
 
 
@@ -21,21 +23,21 @@ def test_methods_that_read_how_the_car_turns_refuse_a_steered_rear_axle(quantity
     for name in methods:
         needs = methods[name].make(method_logs.CAR).needs
         if any(need.channel in TURNING for need in needs):
-            with pytest.raises(InputError, match=f"{quantity}: {name}: the car's file says {REFUSAL}"):
+            with pytest.raises(InputError, match=f"{quantity}: {name}: the car's file has {REFUSAL}"):
                 method_of(quantity, methods, REAR, name)
         else:
             assert method_of(quantity, methods, REAR, name).needs == needs
 
 
 def test_calibrated_sideslip_refuses_it_too():
-    with pytest.raises(InputError, match=f"sideslip: the car's file says {REFUSAL}"):
+    with pytest.raises(InputError, match=f"sideslip: the car's file has {REFUSAL}"):
         estimators.sideslip.model(REAR)
     estimators.sideslip.model(dataclasses.replace(REAR, steering="ackermann"))
 
 
 def test_a_log_is_not_checked_against_such_a_car():
     log = Recording(0.01 * np.arange(200.0), {"v_x": np.full(200, 10.0)})
-    with pytest.raises(InputError, match=f"check_log: the car's file says {REFUSAL}"):
+    with pytest.raises(InputError, match=f"check_log: the car's file has {REFUSAL}"):
         diagnostics.check_log(log, car=REAR)
 
 

@@ -172,7 +172,7 @@ def test_a_look_ahead_that_misleads_is_told_and_one_that_knows_the_noise_does_no
     assert not np.asarray(runs.info.remark)[CASES.index("sharp")].any()
     system, recording = drawn_from("sharp")
     misled = filters.AuxiliaryParticleFilter(N, lookahead=filters.PointLookahead())
-    with pytest.warns(JaxvehWarning, match="of 40 rows: the measurement contradicts what was looked ahead for"):
+    with pytest.warns(JaxvehWarning, match="of 40 rows: the measurement contradicts the lookahead"):
         found = filters.run(misled, system, recording, key=jax.random.key(0))
     assert int(found.result) == 0
     assert np.mean(np.asarray(found.info.remark) == Result.lookahead_misled) > 0.3

@@ -117,12 +117,12 @@ BROKEN = {
     "steering number": ("steering = 3" + PLAIN, r"steering = 3: must be a string"),
     "no ratio": (
         "steering = 'four-wheel'" + PLAIN,
-        r"rear_steer_ratio is missing: a car of steering = \"four-wheel\" needs it",
+        r"rear_steer_ratio is missing: a car with steering = \"four-wheel\" needs it",
     ),
-    "ratio alone": ("rear_steer_ratio = 0.2" + PLAIN, r"rear_steer_ratio = 0.2: is of steering = \"four-wheel\" alone"),
+    "ratio alone": ("rear_steer_ratio = 0.2" + PLAIN, r"rear_steer_ratio = 0.2: only for steering = \"four-wheel\""),
     "ratio of others": (
         "steering = 'rear'\nrear_steer_ratio_fast = 0.2" + PLAIN,
-        r"rear_steer_ratio_fast = 0.2: is of steering = \"four-wheel\" alone",
+        r"rear_steer_ratio_fast = 0.2: only for steering = \"four-wheel\"",
     ),
     "ratio": (
         "steering = 'four-wheel'\nrear_steer_ratio = 20" + PLAIN,

@@ -87,7 +87,7 @@ BROKEN = {
     ),
     "csv key unknown": ('[csv]\ndezimal = ","', r"\[csv\]: no key 'dezimal' \(did you mean 'decimal'"),
     "no column": ('[channels.v_x]\nunit = "m/s"', r"\[channels.v_x\]: has no `column`"),
-    "no channels": ('time = "Zeit"', r"names no channel"),
+    "no channels": ('time = "Zeit"', r"has no channel"),
     "channels no table": ("channels = 3", r"channels = 3: must be tables"),
     "entry a number": ("[channels]\nv_x = 3", r"\[channels.v_x\] = 3: must be a table"),
     "unit a number": ("[channels.v_x]\ncolumn = 'Speed'\nunit = 3", r"\[channels.v_x\]: unit = 3: must be a string"),
@@ -107,7 +107,7 @@ BROKEN = {
     "time not named": ("[channels]\nv_x = 'Speed'", r"no time column"),
     "unit of another thing": (
         "time='Zeit'\n[channels.yaw_rate]\ncolumn = 'Speed'\nunit = 'km/h'",
-        r"yaw_rate \(column 'Speed'\): unit 'km/h' measures another thing; it must be convertible to 'rad/s'",
+        r"yaw_rate \(column 'Speed'\): unit 'km/h' is of another quantity; it must be convertible to 'rad/s'",
     ),
 }
 
@@ -150,7 +150,7 @@ def test_units(value, unit, target, expected):
 
 @pytest.mark.parametrize(("unit", "target"), [("Hz", "rad/s"), ("%", "rad"), ("m", "m/s"), ("kg", "m/s^2"), ("g", "N")])
 def test_units_of_another_thing(unit, target):
-    with pytest.raises(InputError, match="measures another thing"):
+    with pytest.raises(InputError, match="is of another quantity"):
         convert(np.array([1.0]), unit, target, "channel")
 
 

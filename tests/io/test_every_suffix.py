@@ -140,7 +140,7 @@ def test_a_stranger_s_netcdf_is_a_log(tmp_path):
         np.testing.assert_allclose(found["v_x"], time / 3.6, rtol=1e-15)
         np.testing.assert_array_equal(found.time, time)
     assert Recording.from_xarray(data).unit("v_x") == "km/h"  # as it stands there
-    with pytest.raises(InputError, match=r"must be of Estimate|no coordinate|stranger"):
+    with pytest.raises(InputError, match=r"must be of Estimate|no coordinate|another program"):
         Recording.from_xarray(data.drop_vars("time"))
 
 

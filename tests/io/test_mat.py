@@ -108,7 +108,7 @@ def test_a_channel_map_names_time_and_columns_by_their_whole_paths(tmp_path, ver
 
 
 NOTHING = {
-    "no time": ({"x": T, "y": V}, r"no vector goes with a time vector \(time, .*found: x \([15]x[15]\), y"),
+    "no time": ({"x": T, "y": V}, r"no vector belongs to a time vector \(time, .*found: x \([15]x[15]\), y"),
     "another length": ({"t": T, "x": np.zeros(7)}, r"found: x \([17]x[17]\)"),
     "words": ({"car": "sedan"}, "found: nothing"),
 }
@@ -128,7 +128,7 @@ def test_objects_are_named(tmp_path):
     from matlab_files import Opaque
 
     write_new(tmp_path / "log.mat", {"ts": Opaque()})
-    with pytest.raises(InputError, match=r"found: ts \(timeseries\).*save the fields, as in log.v_x.Time"):
+    with pytest.raises(InputError, match=r"found: ts \(timeseries\).*save their fields, such as log.v_x.Time"):
         io.read_recording(tmp_path / "log.mat")
     write_new(tmp_path / "log.mat", {"ts": Opaque(), "time": T, "x": V})
     with pytest.raises(InputError, match=r"no column 'ts'.* Not read: ts \(timeseries\)"):

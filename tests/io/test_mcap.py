@@ -74,7 +74,7 @@ def test_what_is_refused(tmp_path):
         io.write_topics({"/log": pandas.DataFrame({"a": [1.0]})}, path)
     wrong = (([-0.5, 1.0], "0] = -0.5"), ([0.0, 0.0], "1] = 0.0"), ([0.0, np.nan], "1] = nan"), ([0.0, 1e10], "1] = 1"))
     for time, value in wrong:
-        with pytest.raises(InputError, match=r"stamps must be at least zero, and strictly increasing") as raised:
+        with pytest.raises(InputError, match=r"stamps must be at least zero and strictly increasing") as raised:
             io.write_topics({"/log": pandas.DataFrame({"time": time, "a": [1.0, 2.0]})}, path)
         assert f"time[{value}" in str(raised.value)
     with pytest.raises(InputError, match="column 'a', data row 1: 'x' is not a number"):

@@ -92,7 +92,7 @@ def test_what_cannot_be_read_is_told_with_its_encoding(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"found: /imu \(protobuf\)\.$"):
         io.read_recording(path)
     write(path, {"/says": [(0, {"text": "hello"})]})
-    with pytest.raises(InputError, match=r"found: /says \(no number in it\)"):
+    with pytest.raises(InputError, match=r"found: /says \(no numbers\)"):
         io.read_recording(path)
     write(path, {"/imu": [(0, b"not json")]})
     with pytest.raises(InputError, match=r"is not a readable MCAP file"):

@@ -72,11 +72,13 @@ def test_names_in_two_groups_need_a_group(tmp_path):
         [signal("v", [0.0, 1.0], [1.0, 2.0])],
         [signal("v", [0.0, 1.0], [3.0, 4.0])],
     )
-    with pytest.raises(InputError, match=r"channel 'v': no group is named, and it is in 0, 1; say which with `group`"):
+    with pytest.raises(
+        InputError, match=r"channel 'v': no group is named, but it is in 0, 1; give one of them as `group`"
+    ):
         io.read_recording(path)
     chosen = io.ChannelMap({"v_x": io.Channel("v", group=1)})
     np.testing.assert_array_equal(io.read_recording(path, chosen)["v_x"], [3.0, 4.0])
-    with pytest.raises(InputError, match=r"group = 7, and it is in 0, 1"):
+    with pytest.raises(InputError, match=r"group = 7, but it is in 0, 1"):
         io.read_recording(path, io.ChannelMap({"v_x": io.Channel("v", group=7)}))
 
 

@@ -104,7 +104,7 @@ def test_bad_files_are_named(old, new, message):
 def test_what_is_no_property_file(tmp_path):
     other = tmp_path / "notes.tir"
     other.write_text("a line\nb = 3\n")
-    with pytest.raises(InputError, match="no tyre property file"):
+    with pytest.raises(InputError, match="not a tyre property file"):
         read_property_file(other)
     with pytest.raises(InputError, match="cannot be read"):
         read_property_file(tmp_path / "absent.tir")
@@ -188,7 +188,7 @@ def test_a_byte_order_mark_does_not_hide_the_units(tmp_path):
     path.write_bytes(b"\xef\xbb\xbf" + text.encode())
     assert float(tyres.from_property_file(path).structure.UNLOADED_RADIUS) == pytest.approx(0.3)
     path.write_bytes(text.encode("utf-16"))
-    with pytest.raises(InputError, match="holds zero bytes"):
+    with pytest.raises(InputError, match="contains zero bytes"):
         tyres.from_property_file(path)
 
 

@@ -83,7 +83,7 @@ def test_brackets_are_units_only_where_they_hold_one(tmp_path):
 
 def test_csv_refuses_known_channels_in_other_units(tmp_path):
     recording = Recording([0.0, 1.0], {"yaw_rate": [1.0, 2.0]}, {"yaw_rate": "deg/s"})
-    with pytest.raises(InputError, match="yaw_rate is in 'deg/s', not in 'rad/s', and CSV cannot say so"):
+    with pytest.raises(InputError, match="yaw_rate is in 'deg/s', not in 'rad/s', and CSV has no place for units"):
         io.write_recording(recording, tmp_path / "log.csv")
     io.write_recording(io.with_units_in_names(recording), tmp_path / "log.csv")
     np.testing.assert_allclose(io.read_recording(tmp_path / "log.csv")["yaw_rate"], np.deg2rad([1.0, 2.0]), rtol=1e-15)
@@ -123,13 +123,13 @@ BROKEN_CSV = {
     "no rows": ("time,v_x\n", r"the log is empty: it has columns but no row"),
     "no bytes": ("", r"the file is empty"),
     "no time": ("clock,v_x\n0,1\n", r"no time column \(time, timestamps, .*there are: clock, v_x"),
-    "no channel": ("time\n0\n1\n", r"holds no channel beside time"),
+    "no channel": ("time\n0\n1\n", r"has no channel except time"),
     "no header": ("0.0,1.0\n0.1,1.0\n", r"line 1 holds numbers only"),
     "name twice": ("time,v_x,v_x\n0,1,2\n", r"several columns are named 'v_x'"),
     "name twice but for units": ("time,v_x [m/s],v_x [km/h]\n0,1,2\n", r"same name without their \[unit\]"),
     "rows longer than the header": ("time,v_x\n0,1,2\n1,1,2\n", r"more cells than the first line has names \(2\)"),
     "one row longer": ("time,v_x\n0,1\n1,1,2\n", r"more cells than|Expected 2 fields in line 3, saw 3"),
-    "unit of another thing": ("time,yaw_rate [m]\n0,1\n", r"yaw_rate: unit 'm' measures another thing.*'rad/s'"),
+    "unit of another thing": ("time,yaw_rate [m]\n0,1\n", r"yaw_rate: unit 'm' is of another quantity.*'rad/s'"),
     "unit unknown": ("time,yaw_rate [furlogs]\n0,1\n", r"yaw_rate: unit 'furlogs' is not known"),
 }
 
@@ -182,7 +182,7 @@ def test_parquet_of_pandas(tmp_path):
     np.testing.assert_array_equal(recording["on"], [1, 0, 1])
     frame["on"] = pandas.to_datetime([1, 2, 3], unit="s")
     frame.to_parquet(tmp_path / "log.parquet")
-    with pytest.raises(InputError, match="column 'on': holds dates, not numbers"):
+    with pytest.raises(InputError, match="column 'on': contains dates, not numbers"):
         io.read_recording(tmp_path / "log.parquet")
 
 

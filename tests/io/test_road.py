@@ -38,7 +38,7 @@ def test_numbers_alone_need_no_distance(tmp_path):
     [
         ("friction = [1.0, 0.5]", r"road\.toml: distance is missing: friction is a table"),
         ("distance = [0.0, 1.0]\nfriction = [1.0]", r"friction has 1 values: must have 2, as distance"),
-        ("distance = [0.0, 0.0]", r"distance = \[0\.0, 0\.0\]: must rise"),
+        ("distance = [0.0, 0.0]", r"distance = \[0\.0, 0\.0\]: must increase"),
         ("distance = [0.0]", r"distance = .*: must be a list of at least two"),
         ("distance = 3.0", r"distance = .*: must be a list of at least two"),
         ("friction = -0.5", r"friction = -0\.5: must be between 0\.001 and 10"),

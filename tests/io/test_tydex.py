@@ -164,7 +164,7 @@ def test_a_file_without_slip_is_refused():
         ("-2000.", "-2000,", "line 17: '-2000,' is not a number"),
         (line("FZW", "kN", 1), line("FZW", "kN", "one"), "line 11: FZW: conversion 'one': must be a factor"),
         (line("FZW", "kN", 1), line("FZW", "kN", 0), "line 11: FZW: conversion factor 0"),
-        (line("FYW", "N", 1), line("FZW", "N", 1), "channel FZW stands twice, lines 11 and 12"),
+        (line("FYW", "N", 1), line("FZW", "N", 1), "channel FZW occurs twice, in lines 11 and 12"),
     ],
 )
 def test_bad_files_are_named(old, new, message):
