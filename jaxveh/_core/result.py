@@ -32,12 +32,13 @@ class Result(IntEnum):
 
 _MESSAGES = {
     Result.successful: "successful",
-    Result.not_positive_definite: "a covariance lost positive definiteness (raise process noise or the prior's spread, "
-    "or use float64)",
+    Result.not_positive_definite: "a covariance lost positive definiteness (give each state process noise, unless others move "
+    "it; raise process noise or the prior's spread, or use float64)",
     Result.all_particles_dead: "every particle has zero weight: no particle explains the measurement (widen measurement "
     "noise or the prior, use a heavy-tailed noise law, or more particles)",
     Result.non_finite_input: "an input or a measurement is infinite, or an input is NaN (fill gaps with recording.fill)",
-    Result.non_finite_state: "the state is no longer finite (the model diverged: check parameters, step and signs)",
+    Result.non_finite_state: "the state is no longer finite: the model diverged (take more steps between rows, such as "
+    "state_space(..., steps=4), and check parameters and signs)",
     Result.not_converged: "the solver stopped before its tolerance was met (use more steps, or better start values)",
     Result.too_stiff: "the step is too long for the model's fastest pole (shorten the step or choose an implicit solver)",
     Result.measurement_too_late: "a measurement is older than the rows that are kept, and was not used (increase depth)",

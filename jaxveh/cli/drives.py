@@ -12,6 +12,7 @@ from jaxveh import InputError, Recording, diagnostics, estimators, io
 from jaxveh.cli import options
 from jaxveh.cli.blanking import SEEN, fill_gaps
 from jaxveh.cli.console import results
+from jaxveh.cli.missing_speed import with_speed
 from jaxveh.io import CarSpecification
 
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "cyan", "ok": "green"}
@@ -52,7 +53,8 @@ def read_drives(
     """
     drives = []
     for log in logs:
-        recording = fill_gaps(_on_one_clock(log, _read(log, car, channels, span)), fill)
+        recording = with_speed(log, _on_one_clock(log, _read(log, car, channels, span)), car)
+        recording = fill_gaps(recording, fill)
         findings = _look_at(log, recording, car, {*SEEN, "time", *(name for name in used if name)}, anyway)
         drives.append(Drive(log, recording, findings))
     if not anyway:

@@ -14,6 +14,7 @@ from jaxveh._core.errors import check_one_of, check_positive
 from jaxveh._core.recording import TRUTH
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.drives import read_log
+from jaxveh.cli.missing_speed import with_speed
 from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
 from jaxveh.cli.quantity_options import QUANTITIES, USUAL_FILTER, USUAL_PARTICLES
 from jaxveh.estimators import Answers, Compared, MethodScore
@@ -23,6 +24,8 @@ ALL = "all"
 """In `--what`: each quantity that the log has channels for, by its recommended method; in `--methods`: all methods."""
 
 NOTHING = "nothing done"
+
+SPEED = "speed"
 
 ALIKE = {"v_y": ("v_y", "sideslip"), "sideslip": ("v_y", "sideslip"), "speed": ("speed", "v_x"), "v_x": ("v_x",)}
 """Channels that reveal the truth of a quantity: they are hidden from every method."""
@@ -112,7 +115,13 @@ def estimate_quantities(asked: Asked, numbers: Path | None) -> None:
         shown = []
         for k, (log, (seen, recording)) in enumerate(zip(asked.logs, told, strict=True)):
             report(k, len(told), f"estimating along {log.name} (compiling first)")
-            shown.append({name: _one(asked, QUANTITIES[name], car, seen, recording) for name in asked.what})
+            driven = seen if asked.what == (SPEED,) else with_speed(log, seen, car)
+            shown.append(
+                {
+                    name: _one(asked, QUANTITIES[name], car, seen if name == SPEED else driven, recording)
+                    for name in asked.what
+                }
+            )
     for log, product, (_, recording), one in zip(asked.logs, products, told, shown, strict=True):
         found[log.name] = _conclude(asked, log, product, recording, one)
     content = found[asked.logs[0].name] if len(asked.logs) == 1 else {"logs": found}

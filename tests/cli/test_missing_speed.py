@@ -1,0 +1,54 @@
+"""A log with wheel speeds and without `v_x` is estimated with the speed that the wheels give, and the program says so."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from programs import run
+
+from jaxveh import Recording, estimators, io
+from jaxveh.cli.missing_speed import with_speed
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "estimators"))
+import method_logs
+
+
+def log(*without):
+    made = method_logs.channels()
+    time = made.pop("time")
+    whole = Recording(time, made, {name: io.canonical_unit(name) or "" for name in made})
+    return whole.without(*[name for name in whole.names if name.startswith(without)]) if without else whole
+
+
+def test_a_measured_speed_is_left_as_it_is_and_without_wheels_there_is_none(capsys):
+    for drive in (log(), log("v_x", "speed", "wheel_speed")):
+        assert with_speed(Path("a.csv"), drive, method_logs.CAR) is drive
+    assert capsys.readouterr().out == ""
+
+
+def test_the_speed_is_that_of_the_recommended_method(capsys):
+    drive = log("v_x", "speed")
+    found = with_speed(Path("a.csv"), drive, method_logs.CAR)
+    assert set(found.names) == {*drive.names, "v_x"} and found.unit("v_x") == "m/s"
+    np.testing.assert_array_equal(found["v_x"], estimators.speed.estimate(method_logs.CAR, drive)["v_x"])
+    error = np.asarray(found["v_x"]) - np.asarray(log()["v_x"])
+    assert np.sqrt(np.mean(error**2)) < 0.02 * np.mean(log()["v_x"])
+    assert "note: a.csv: there is no v_x: it is estimated from the wheel speeds" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("what", [("--as-told",), ("--what", "bank")])
+def test_programs_take_such_a_log(tmp_path, what):
+    io.write_car(method_logs.CAR, tmp_path / "car.toml")
+    columns = {}
+    for name, drive in {"with": log(), "without": log("v_x", "speed")}.items():
+        io.write_recording(drive, tmp_path / f"{name}.csv")
+        out = tmp_path / f"{name}.out.csv"
+        result = run("estimate", tmp_path / f"{name}.csv", "--vehicle", tmp_path / "car.toml", "-o", out, *what, "--anyway")
+        assert result.exit_code == 0, result.output
+        assert ("there is no v_x" in " ".join(result.stdout.split())) == (name == "without")
+        frame = np.genfromtxt(out, delimiter=",", names=True, deletechars="")
+        column = next(one for one in frame.dtype.names if one.startswith(("v_y", "bank")) and "std" not in one)
+        columns[name] = frame[column]
+    apart = np.sqrt(np.nanmean((columns["with"] - columns["without"]) ** 2))
+    assert 0.0 < apart < 0.3 * np.sqrt(np.nanmean(columns["with"] ** 2))
