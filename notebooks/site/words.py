@@ -330,6 +330,7 @@ SHARED = {
     "arctan2.y": "an array",
     "hypot.y": "an array",
     "passes.x": "m, longitudinal position",
+    "numbers_learned.said": "`Answers` along a log, or a live `Answer`",
 }
 """Descriptions by the argument's name."""
 
