@@ -1,1 +1,1 @@
-"""The site: pages, executed guides and notebooks, drawings, the reference; built by `python -m notebooks.site`."""
+"""The site: pages, executed guides and notebooks, drawings and the reference; built by `python -m notebooks.site`."""

@@ -1,8 +1,8 @@
 """Build the site: `python -m notebooks.site`, from the project's root, with `pip install -e ".[docs]"`.
 
-What the pages' code prints and draws is taken from `--executed`; `--execute` runs every page whose output is not there (a
-minute or two each for notebooks; `JAXVEH_SMOKE=1` at a small size). `--builder mkdocs` builds with Material for MkDocs, whose
-link check is the stricter one.
+The output and the figures of the pages' code are taken from the folder `--executed`. `--execute` runs every page whose output
+is not there yet (a minute or two for each notebook; `JAXVEH_SMOKE=1` runs them at a small size). `--builder mkdocs` builds with
+Material for MkDocs, whose link check is stricter.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def main() -> int:
         prog="python -m notebooks.site", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--execute", action="store_true", help="run the code of pages whose output is not there yet")
-    parser.add_argument("--executed", type=Path, default=BUILD / "executed", help="folder of what the code left")
+    parser.add_argument("--executed", type=Path, default=BUILD / "executed", help="folder with the output of the code")
     parser.add_argument("--builder", choices=("zensical", "mkdocs"), default="zensical")
     given = parser.parse_args()
     if given.execute:
@@ -34,7 +34,7 @@ def main() -> int:
 
 
 def execute(folder: Path) -> None:
-    """Run every page and notebook whose output is not in the folder, each in a process of its own."""
+    """Run every page and notebook whose output is not in the folder, each in a separate process."""
     for place, page in sources().items():
         text = page.read_text()
         if any(map(is_run, blocks_of(text))):
@@ -52,7 +52,7 @@ def execute(folder: Path) -> None:
 
 
 def run_notebook(page: Path, folder: Path) -> None:
-    """Run a notebook, and leave it with its outputs in the folder."""
+    """Run a notebook and save it with its outputs in the folder."""
     import nbformat
     from nbclient import NotebookClient
 
@@ -63,8 +63,8 @@ def run_notebook(page: Path, folder: Path) -> None:
 
 
 def build(builder: str) -> int:
-    """Build strictly; the exit status."""
-    # Both find the configuration's extensions from the project's root.
+    """Build in strict mode and return the exit status."""
+    # Both builders find the configuration's extensions from the project's root.
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "NO_MKDOCS_2_WARNING": "1"}
     command = {
         "zensical": [sys.executable, "-m", "zensical", "build", "--clean", "--strict"],

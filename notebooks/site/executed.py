@@ -1,9 +1,9 @@
-"""A page's code, run from top to bottom in an empty folder: what it prints, and the figures that it draws.
+"""Runs the code of a page from top to bottom in an empty folder, and keeps its output and its figures.
 
-A block of `python` goes on where the last one ended. A block of `sh` runs in the same folder. A block with a title
-(`toml title="car.toml"`) is written to the file of that name. All others are not run.
+All `python` blocks share one namespace. A block of `sh` runs in the same folder. A block with a title
+(`toml title="car.toml"`) is written to the file of that name. Other blocks are not run.
 
-`python -m notebooks.site.executed PAGE FOLDER` leaves `outputs.json` and figures in FOLDER.
+`python -m notebooks.site.executed PAGE FOLDER` writes `outputs.json` and figures to FOLDER.
 """
 
 from __future__ import annotations
@@ -44,26 +44,26 @@ def blocks_of(text: str) -> list[Block]:
 
 
 def digest(text: str) -> str:
-    """What tells a page from the same page before it was changed."""
+    """A hash of a page, which changes with its text."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def outputs_of(page: str, folder: Path) -> list[dict]:
-    """What the blocks of this text left in a folder; nothing where another text, or none, was run."""
+    """The outputs of the blocks of this text in a folder; empty if another text, or none, was run."""
     file = folder / "outputs.json"
     left = json.loads(file.read_text()) if file.exists() else {}
     return left["outputs"] if left.get("page") == digest(page) else []
 
 
 def is_run(block: Block) -> bool:
-    """Whether a block does something: runs, or makes a file."""
+    """Whether a block runs or makes a file."""
     return bool(block.title) or block.language in ("python", "sh")
 
 
 def run_page(page: Path, folder: Path) -> list[dict]:
-    """Run a page's blocks in a new folder; for each what it printed (`text`) and its figure's name (`figure`, "" without one).
+    """Run a page's blocks in a new folder; return each block's output (`text`) and the name of its figure (`figure`, "" if none).
 
-    Figures are written to `folder`. **Raises** what the page's code raises, or `RuntimeError` for a command that fails.
+    Figures are written to `folder`. **Raises** the errors of the page's code, or `RuntimeError` for a command that fails.
     """
     folder.mkdir(parents=True, exist_ok=True)
     namespace: dict = {"__name__": "__main__"}
@@ -86,7 +86,7 @@ def run_page(page: Path, folder: Path) -> list[dict]:
 
 
 def _run_python(code: str, namespace: dict, name: str):
-    """What a block prints, and the figure that its last expression is, if it is one."""
+    """The output of a block, and its last expression if that is a figure."""
     tree = ast.parse(code)
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
     printed, value = io.StringIO(), None
@@ -100,7 +100,7 @@ def _run_python(code: str, namespace: dict, name: str):
 
 
 def _run_shell(code: str, name: str) -> str:
-    """What the commands of a block print; programs are those of this Python."""
+    """The output of the commands of a block; programs are those of this Python."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(
         ["bash", "-e", "-c", code],

@@ -1,6 +1,6 @@
-"""Equations as MathML, which browsers draw by themselves: no script, no font, no network.
+"""Equations as MathML, which browsers draw without a script, a font or a network.
 
-In a page `$...$` stands in a line and `$$...$$` for itself; code is left alone.
+In a page `$...$` is an inline equation and `$$...$$` a displayed one; code is left unchanged.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ INLINE = re.compile(r"(?<![\\$\w])\$(?!\s)([^$\n]+?)(?<!\s)\$(?![\w$])")
 
 
 def draw_equations(text: str) -> str:
-    """A page whose equations are MathML."""
+    """The page with its equations as MathML."""
     parts = CODE.split(text)
     return "".join(part if place % 2 else _draw(part) for place, part in enumerate(parts))
 

@@ -1,4 +1,4 @@
-"""The pages of the site, put together in a folder: guides with what they print, notebooks, drawings, the reference."""
+"""Puts the pages of the site together in a folder: guides with their outputs, notebooks, drawings and the reference."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ SOURCES = Path(__file__).resolve().parents[1]
 CAPTION = re.compile(r"\n+Figure: (.+?)(?=\n\n|\Z)", re.S)
 HIDDEN = "site"
 FOLDED_FROM = 24
-"""Lines."""
+"""Lines of output from which it is folded."""
 
 
 def sources() -> dict[str, Path]:
-    """Every page written by hand, by its place in the site."""
+    """Every hand-written page, by its place in the site."""
     return {
         str(path.relative_to(SOURCES)): path for path in sorted(SOURCES.rglob("*.md")) if HIDDEN not in path.parts[:-1]
     }
 
 
 def put_together(folder: Path, executed: Path) -> None:
-    """Make the site's pages in a new folder, with what their code left in `executed` (a folder a page), where it ran."""
+    """Make the site's pages in a new folder, with the outputs of their code from `executed` (a folder for each page), if any."""
     if folder.exists():
         shutil.rmtree(folder)
     texts = {place: path.read_text() for place, path in sources().items()}
@@ -52,7 +52,7 @@ def put_together(folder: Path, executed: Path) -> None:
 
 
 def name_of(place: str) -> str:
-    """The folder of what a page's code left."""
+    """The name of the folder with the outputs of a page's code."""
     return place.removesuffix(".md").replace("/", "-")
 
 
@@ -62,7 +62,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _with_outputs(place: str, text: str, folder: Path, executed: Path) -> str:
-    """A page with what each block printed below it, and its figure in place of the line that begins with `Figure:`."""
+    """A page with the output of each block below it, and its figure in place of the line that begins with `Figure:`."""
     left = executed / name_of(place)
     outputs = outputs_of(text, left)
     blocks = blocks_of(text)
@@ -87,7 +87,7 @@ def _with_outputs(place: str, text: str, folder: Path, executed: Path) -> str:
 
 
 def _printed(text: str) -> str:
-    """What a block printed; folded where it is long."""
+    """The output of a block; folded if it is long."""
     fence = f"```text\n{text}\n```"
     if text.count("\n") < FOLDED_FROM:
         return f"\n\n{fence}"
@@ -99,7 +99,7 @@ def _figure(path: str, caption: str) -> str:
 
 
 def _write_notebook(path: Path, folder: Path) -> None:
-    """A notebook as a page, its figures beside it."""
+    """Write a notebook as a page, with its figures beside it."""
     from nbconvert import MarkdownExporter
 
     text, made = MarkdownExporter().from_filename(

@@ -1,7 +1,7 @@
-"""The reference: a page a module, made of what the code itself says, and of the pages' code that uses it.
+"""The reference: one page per module, generated from docstrings, declarations and the code of pages that use the module.
 
-A page's head is written by hand in `notebooks/reference/`: what the module is for, and an example that runs. Below it each public
-name has its signature and text (mkdocstrings), its arguments, and the lines of pages that use it.
+The head of a page is written by hand in `notebooks/reference/`: the purpose of the module, and an example that runs. Below it
+each public name has its signature and text (mkdocstrings), its arguments, and the lines of pages that use it.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from notebooks.site.words import SHARED, SHARED_VALUES
 
 PLACE = "reference"
 PROGRAMS = ("jaxveh.cli",)
-"""Described by their own `--help`."""
+"""Documented by their own `--help`."""
 
 
 class Entry(NamedTuple):
-    """A public name: the module that lists it first, its name, and what it is."""
+    """A public name: the module that lists it first, its name, and its value."""
 
     module: str
     name: str
@@ -42,12 +42,12 @@ class Entry(NamedTuple):
 
     @property
     def short(self) -> str:
-        """As one writes it after `from jaxveh import ...`."""
+        """As written after `from jaxveh import ...`."""
         return self.path.removeprefix("jaxveh.")
 
 
 class Argument(NamedTuple):
-    """An argument of a public name: its name, type, default and words; empty where there are none."""
+    """An argument of a public name: its name, type, default and description; each empty if absent."""
 
     name: str
     type: str
@@ -56,7 +56,7 @@ class Argument(NamedTuple):
 
 
 def public_modules() -> list[str]:
-    """Every module that lists what is public, shortest names first."""
+    """Every module that lists public names, the least nested first."""
     found = ["jaxveh"]
     for module in pkgutil.walk_packages(jaxveh.__path__, "jaxveh."):
         private = any(part.startswith("_") for part in module.name.split("."))
@@ -66,7 +66,7 @@ def public_modules() -> list[str]:
 
 
 def public_entries() -> dict[str, list[Entry]]:
-    """The entries of each module; what several modules list stands in the first alone."""
+    """The entries of each module; a name that several modules list is an entry of the first only."""
     seen: set[int] = set()
     pages: dict[str, list[Entry]] = {}
     for name in public_modules():
@@ -82,7 +82,7 @@ def public_entries() -> dict[str, list[Entry]]:
 
 
 def arguments_of(entry: Entry) -> list[Argument]:
-    """What a function or class takes, each with its words."""
+    """The arguments of a function or class, each with its description."""
     if not callable(entry.value) or not entry.value.__module__.startswith("jaxveh") or _is_made_elsewhere(entry.value):
         return []
     try:
@@ -97,7 +97,7 @@ def arguments_of(entry: Entry) -> list[Argument]:
 
 
 def _is_made_elsewhere(value: Any) -> bool:
-    """Whether a class is made as another library says: an enumeration, a figure."""
+    """Whether another library defines how a class is made: an enumeration, a figure."""
     bases = value.__mro__ if inspect.isclass(value) else ()
     return any(base is enum.Enum or base.__module__.startswith("matplotlib") for base in bases)
 
@@ -118,7 +118,7 @@ def _default(p: inspect.Parameter) -> str:
 
 
 def _words(entry: Entry, name: str) -> str:
-    """What an argument is: its unit and range, then what its owner's text says, or what the name means everywhere."""
+    """The description of an argument: its unit and range, then the words of its owner's text or the shared words of its name."""
     declared, text = _declared(entry.value, name), " ".join(text_of(entry.value).split())
     said = (
         _explained(text, name)
@@ -147,7 +147,7 @@ def _declared(value: Any, name: str) -> str:
 
 
 def text_of(value: Any) -> str:
-    """The docstring of a function; of a class those of the classes that it is made of, too."""
+    """The docstring of a function; for a class also those of its base classes."""
     if not inspect.isclass(value):
         return inspect.getdoc(value) or ""
     own = [base.__dict__.get("__doc__") or "" for base in value.__mro__ if base.__module__.startswith("jaxveh")]
@@ -155,7 +155,7 @@ def text_of(value: Any) -> str:
 
 
 def _explained(text: str, name: str) -> str:
-    """What stands behind an argument's name in a text, in brackets or after a colon."""
+    """The words behind an argument's name in a text, in brackets or after a colon."""
     if found := re.search(rf"`{re.escape(name)}`(?:, `\w+`)*(?: and `\w+`)? \(([^()]+)\)", text):
         return found[1]
     if found := re.search(rf"`{re.escape(name)}`: ([^.;`(]+(?:`[^`]+`[^.;`(]*)*)", text):
@@ -164,7 +164,7 @@ def _explained(text: str, name: str) -> str:
 
 
 def _sentence(text: str, pattern: str) -> str:
-    """The first sentence of a text that has the pattern, without its full stop; where it is long, that it is there."""
+    """The first sentence of a text that has the pattern, without its full stop; if it is long, a pointer to the text."""
     sentences = re.split(r"(?<=[a-z)`\]0-9])[.;](?= [A-Z`*a-z])| - (?=`)", text)
     told = (one.strip(" .") for one in sentences if "**Raises" not in one)
     found = next((one for one in told if re.search(pattern, one)), "")
@@ -172,7 +172,7 @@ def _sentence(text: str, pattern: str) -> str:
 
 
 def signature_of(entry: Entry) -> str:
-    """A class as one makes it, on lines of its own where it is long."""
+    """The call that makes a class, on several lines if it is long."""
     given = []
     for p in inspect.signature(entry.value).parameters.values():
         if p.name == "self":
@@ -184,7 +184,7 @@ def signature_of(entry: Entry) -> str:
 
 
 def usages(pages: dict[str, str]) -> dict[str, list[tuple[str, str]]]:
-    """By what one writes (`filters.run`) the statements that use it: (page, code), shortest first."""
+    """The statements that use each name (such as `filters.run`): (page, code), shortest first."""
     found: dict[str, list[tuple[str, str]]] = {}
     for page, text in pages.items():
         for block in blocks_of(text):
@@ -195,7 +195,7 @@ def usages(pages: dict[str, str]) -> dict[str, list[tuple[str, str]]]:
 
 
 def _names_used(code: str) -> Iterator[tuple[str, str]]:
-    """What each statement of a block uses of the package: `filters.run`, `Recording` as `Recording`."""
+    """The names of the package that each statement of a block uses: `filters.run`, `Recording` as `Recording`."""
     for statement in ast.parse(code).body:
         text = ast.get_source_segment(code, statement) or ""
         if isinstance(statement, ast.Import | ast.ImportFrom):
@@ -210,7 +210,7 @@ def _names_used(code: str) -> Iterator[tuple[str, str]]:
 
 
 def write_reference(heads: Path, folder: Path, pages: dict[str, str]) -> None:
-    """Write the pages of all modules into a folder; `heads` has what stands above them, `pages` the site's pages by path."""
+    """Write the pages of all modules into a folder; `heads` has the texts above them, `pages` the site's pages by path."""
     uses = usages(pages)
     folder.mkdir(parents=True, exist_ok=True)
     for module, entries in public_entries().items():
@@ -231,7 +231,7 @@ def _opening(module: str) -> str:
 
 
 def _overview(module: str, entries: list[Entry]) -> str:
-    """A table of what the module lists; what another page has is linked there."""
+    """A table of the names that the module lists, with links to those on other pages."""
     rows = [f"| [`{entry.name}`](#{entry.path}) | {_first_sentence(entry)} |" for entry in entries]
     there = {id(entry.value): entry for entry in _every_entry() if callable(entry.value)}
     own = {entry.name for entry in entries}
@@ -269,7 +269,7 @@ def _entry(entry: Entry, uses: dict[str, list[tuple[str, str]]], page: str) -> s
 
 
 def _related(entry: Entry) -> str:
-    """Of a class, which functions return it, and which public classes are of its kind."""
+    """For a class: the functions that return it, and its public subclasses."""
     if not inspect.isclass(entry.value):
         return ""
     returned, kinds = [], []
@@ -300,12 +300,12 @@ def _returns(function: Any) -> str:
 
 
 def has_example(entry: Entry, uses: dict[str, list[tuple[str, str]]]) -> bool:
-    """Whether a page shows how it is used, or says what returns it or is of its kind."""
+    """Whether a page shows how it is used, or names the functions that return it or its subclasses."""
     return entry.short in uses or bool(_related(entry)) or not callable(entry.value)
 
 
 def _heading(entry: Entry) -> str:
-    """Name and text: mkdocstrings' of what is ours; a value with its text; of another library's that it is as it is there."""
+    """Name and text: by mkdocstrings for names of this package; the value and its text; a note for names of other libraries."""
     anchor = f"## {entry.name} {{ #{entry.path} }}"
     if not callable(entry.value):
         return f"{anchor}\n\n{_shown_value(entry.value)}\n\n{text_of_value(entry)}"
@@ -314,7 +314,7 @@ def _heading(entry: Entry) -> str:
     home = f"{entry.value.__module__}.{entry.name}"
     if not entry.value.__module__.endswith(f".{entry.name}") or entry.module == entry.value.__module__:
         return f"::: {entry.path}"
-    # By its path in the room mkdocstrings finds the module of the same name.
+    # By the path in the room, mkdocstrings would find the module of the same name.
     options = f'    options:\n      heading: "{entry.path}"\n      toc_label: "{entry.name}"'
     return f'<a id="{entry.path}"></a>\n\n::: {home}\n{options}'
 
@@ -328,7 +328,7 @@ def _shown_value(value: Any) -> str:
 
 @functools.cache
 def _texts_of_values() -> dict[str, list[tuple[str, str]]]:
-    """What stands below each constant of the package: (module, text) by its name."""
+    """The text below each constant of the package: (module, text) by its name."""
     found: dict[str, list[tuple[str, str]]] = {}
     root = Path(jaxveh.__file__).parent
     for path in sorted(root.rglob("*.py")):
@@ -347,7 +347,7 @@ def _texts_of_values() -> dict[str, list[tuple[str, str]]]:
 
 
 def text_of_value(entry: Entry) -> str:
-    """What stands below a constant, in its own room before others."""
+    """The text below a constant; that of its own room is preferred."""
     room = entry.module.removesuffix(".kit")
     texts = _texts_of_values().get(entry.name, [])
     here = [text for module, text in texts if module.startswith(room)]
@@ -355,7 +355,7 @@ def text_of_value(entry: Entry) -> str:
 
 
 def _cell(text: str) -> str:
-    # In a table a bar would begin the next cell, in code too.
+    # In a table a bar begins the next cell, even in code.
     return f"<code>{html.escape(text).replace('|', '&#124;')}</code>" if text else ""
 
 

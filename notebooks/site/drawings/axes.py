@@ -23,7 +23,7 @@ from notebooks.site.drawings.svg import (
 
 
 def from_above() -> str:
-    """x forward, y left; steer, sideslip and yaw rate turn left."""
+    """x forward, y left; steer, sideslip and yaw rate are positive to the left."""
     x, y, turn, slip = 330, 190, 18, 14
     wheels = [(x + 105, y - 52, turn), (x + 105, y + 52, turn), (x - 105, y - 52, 0), (x - 105, y + 52, 0)]
     drawn = [box(x, y, 300, 100, fill=PALE, round_by=16)]

@@ -1,4 +1,4 @@
-"""The cars' degrees of freedom: what each fidelity lets move."""
+"""The cars' degrees of freedom: the motions of each fidelity."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def _four_wheels(x: float, y: float, spin: bool = False) -> list[str]:
 
 
 def _moves(x: float, y: float, forward: bool) -> list[str]:
-    """What moves in the plane: lateral, yaw, and forward where the speed is a state."""
+    """The motions in the plane: lateral, yaw, and forward if the speed is a state."""
     drawn = [arrow(x, y, x, y - 52, BLUE), symbol(x + 14, y - 46, "v_y", BLUE), arc(x, y, 26, 210, 330, RED)]
     return [*drawn, *([arrow(x, y, x + 92, y, BLUE), symbol(x + 92, y - 10, "v_x", BLUE)] if forward else [])]
 
 
 def _from_behind(x: float, y: float, unsprung: bool) -> list[str]:
-    """A body that rolls; with wheels that move up and down of their own."""
+    """A body that rolls; optionally with wheels that move up and down independently."""
     drawn = [
         box(x, y - 14, 96, 56, -6, PALE, round_by=10),
         arc(x, y - 6, 46, 120, 60, RED),

@@ -1,4 +1,4 @@
-"""A filter's step: what is known is predicted, then updated; as a Gaussian and as particles."""
+"""A filter's step: the belief is predicted, then updated; as a Gaussian and as particles."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def gaussian_step() -> str:
 
 
 def particle_step() -> str:
-    """Particles are moved, weighed and drawn anew."""
+    """Particles are moved, weighted and resampled."""
     drawn: list[str] = []
     places = [(-60, 6), (-38, 7), (-20, 9), (-4, 7), (14, 8), (34, 6), (58, 7)]
     columns = (110, 300, 490, 660)
@@ -60,12 +60,12 @@ def particle_step() -> str:
         760,
         230,
         *drawn,
-        title="A particle filter: particles are moved, weighed by the measurement's likelihood, and drawn anew",
+        title="A particle filter: particles are moved, weighted by the measurement's likelihood, and resampled",
     )
 
 
 def rooms() -> str:
-    """From a log to an answer."""
+    """From a log to an answer: the modules of the package."""
     names = (
         ("io", "a log, a car's file"),
         ("estimators", "state space"),

@@ -1,4 +1,4 @@
-"""The few shapes that the drawings are made of: strings of SVG, x to the right and y down, in pixels."""
+"""The shapes of the drawings: strings of SVG, x to the right and y down, in pixels."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ INK, BLUE, RED, GREEN, GREY, PALE = "#1f2933", "#1b6ca8", "#c8553d", "#3a7d44", 
 
 
 def page(width: float, height: float, *shapes: str, title: str) -> str:
-    """A drawing on white, so that it reads on a dark page too."""
+    """A drawing on a white background, so that it is readable on a dark page, too."""
     arrow = "".join(
         f'<marker id="head{colour[1:]}" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="6.5" markerHeight="6.5" '
         f'orient="auto-start-reverse"><path d="M0 0L10 5L0 10z" fill="{colour}"/></marker>'
@@ -29,12 +29,12 @@ def line(x1, y1, x2, y2, colour=INK, width=1.5, dash="") -> str:
 
 
 def arrow(x1, y1, x2, y2, colour=INK, width=2.0) -> str:
-    """A line with a head at its end."""
+    """A line with an arrowhead at its end."""
     return line(x1, y1, x2, y2, colour, width).replace("/>", f' marker-end="url(#head{colour[1:]})"/>')
 
 
 def arc(x, y, radius, start, end, colour=INK, width=2.0, head=True) -> str:
-    """A part of a circle about (x, y), from angle to angle (degrees counter-clockwise from the right), with a head at its end."""
+    """An arc about (x, y), from angle to angle (degrees counter-clockwise from the right), with an arrowhead at its end."""
     x1, y1 = x + radius * math.cos(math.radians(start)), y - radius * math.sin(math.radians(start))
     x2, y2 = x + radius * math.cos(math.radians(end)), y - radius * math.sin(math.radians(end))
     large, sweep = int(abs(end - start) > 180), int(end < start)
@@ -46,7 +46,7 @@ def arc(x, y, radius, start, end, colour=INK, width=2.0, head=True) -> str:
 
 
 def box(x, y, width, height, angle=0.0, fill="none", colour=INK, round_by=3.0) -> str:
-    """A rectangle about its middle, turned counter-clockwise by degrees."""
+    """A rectangle about its centre, rotated counter-clockwise by degrees."""
     return (
         f'<rect x="{x - width / 2:.1f}" y="{y - height / 2:.1f}" width="{width}" height="{height}" rx="{round_by}" fill="{fill}" '
         f'stroke="{colour}" stroke-width="1.5" transform="rotate({-angle} {x:.1f} {y:.1f})"/>'
@@ -65,12 +65,12 @@ def curve(points, colour=INK, width=2.0) -> str:
 
 
 def text(x, y, words, colour=INK, anchor="middle", size=15) -> str:
-    """Words."""
+    """A text."""
     return f'<text x="{x:.1f}" y="{y:.1f}" fill="{colour}" text-anchor="{anchor}" font-size="{size}">{escape(words)}</text>'
 
 
 def symbol(x, y, words, colour=INK, anchor="middle") -> str:
-    """A letter of an equation; what follows its `_` is set below."""
+    """A symbol of an equation; the part after `_` is a subscript."""
     head, _, below = words.partition("_")
     index = f'<tspan dy="4" font-size="12">{escape(below)}</tspan>' if below else ""
     return (
