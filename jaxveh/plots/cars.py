@@ -33,7 +33,7 @@ def car(vehicle: AbstractVehicle | CarSpecification, *, figure: Any = None) -> A
     wheels = np.array([[float(number) for number in place] for place in places])
     front, rear = wheels[:2, 0].mean(), wheels[2:, 0].mean()
     if front - rear <= 0:
-        raise InputError(f"plots.car: {type(vehicle).__name__} has no positions of its wheels: nothing to draw.")
+        raise InputError(f"plots.car: {type(vehicle).__name__} has no wheel positions: there is nothing to draw.")
     tracks = [float(np.ptp(pair[:, 1])) for pair in (wheels[:2], wheels[2:])]
     half = max(*tracks, 1.0) / 2 + BESIDE
     with style():

@@ -470,7 +470,7 @@ def test_a_value_of_a_sweep_is_a_figure(made):
 
 
 def test_what_cannot_be_drawn_is_told(made):
-    with pytest.raises(InputError, match=r"Longitudinal has no wheels"):
+    with pytest.raises(InputError, match=r"Longitudinal has no wheel positions"):
         vehicles.Longitudinal(1500.0).plot()
     with pytest.raises(InputError, match=r"a batch of cars"):
         jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), vehicles.passenger_car()).plot()
