@@ -187,7 +187,9 @@ def test_an_estimate_keeps_what_it_is_asked_to(keep):
         filters.run(filters.Extended(), model, recording),
         filters.run(filters.Extended(), model, recording, keep=keep),
     )
-    assert (part.log_likelihood, part.result) == (whole.log_likelihood, whole.result)
+    assert part.result == whole.result
+    # On jax 0.12 the sum over the rows is another program where nothing else is kept, and may differ in the last digit.
+    np.testing.assert_allclose(part.log_likelihood, whole.log_likelihood, rtol=1e-15)
     for name in ("mean", "std"):
         if name in keep:
             same(getattr(part, name), getattr(whole, name), 0.0, 0.0)
