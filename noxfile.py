@@ -1,6 +1,7 @@
 """Releases: `nox` builds wheel and sdist, and installs the wheel alone on each Python that is there (`pip install nox uv`).
 
-`nox -s lowest`: the lower bounds of the dependencies. What the tests need is in `.ci/run`.
+`nox -s lowest`: the lower bounds of the dependencies. `nox -s tests`: the default tests on each Python; each change has them on the
+first alone (`.ci/run`).
 """
 
 import pathlib
@@ -32,6 +33,13 @@ def wheel(session: nox.Session) -> None:
     (made,) = (file for file in files() if file.suffix == ".whl")
     session.install(str(made))
     smoke(session)
+
+
+@nox.session(python=PYTHONS)
+def tests(session: nox.Session) -> None:
+    """The default tests, with the jax that this Python gets."""
+    session.install(".[test]")
+    session.run("python", "-m", "pytest", *session.posargs)
 
 
 @nox.session(python="3.11", venv_backend="uv")
