@@ -1,7 +1,7 @@
 """Releases: `nox` builds wheel and sdist, and installs the wheel alone on each Python that is there (`pip install nox uv`).
 
-`nox -s lowest`: the lower bounds of the dependencies. `nox -s tests`: the default tests on each Python; each change has them on the
-first alone (`.ci/run`).
+`nox -s lowest`: the lower bounds of the dependencies. `nox -s tests`: the default tests on each Python; `.ci/run` has those of
+the first alone.
 """
 
 import pathlib

@@ -113,7 +113,7 @@ def test_the_truth_of_a_simulation_is_scored_as_a_measured_one_is(tmp_path, driv
     assert numbers[0]["sideslip_rmse_deg"] == numbers[1]["sideslip_rmse_deg"] > 0
     both = {**drive, "true.v_y": drive["v_y"]}
     result, _ = estimate(tmp_path, both, "--calibrate", "0:2", "--calibrate-on", "v_y", "--truth", "true.v_y")
-    assert result.exit_code == 2 and "calibrated on v_y, too" in error_line(result)
+    assert result.exit_code == 2 and "--calibrate-on uses v_y" in error_line(result)
 
 
 def test_devices_with_clocks_of_their_own(tmp_path):
@@ -473,7 +473,7 @@ def test_a_calibration_of_another_car_and_options_that_contradict_it(kept, tmp_p
     other = write_car(tmp_path, CAR.replace("mass = 1420.0", "mass = 1421.0"))
     start = ("estimate", kept / "drive.csv", "--calibration", kept / "calibration.toml", "-o", tmp_path / "e.csv")
     line = error_line(run(*start, "--vehicle", other))
-    assert "is of another car: its mass is 1420.0, that of --vehicle 1421.0" in line
+    assert "is of another car: its mass is 1420.0, but that of --vehicle is 1421.0" in line
     assert "leave out --as-told" in error_line(run(*start, "--as-told"))
     assert "leave out --calibrate" in error_line(run(*start, "--calibrate", "0:25"))
     both = (

@@ -153,7 +153,7 @@ def fit_of(*converged, rmse=10.0, validated=11.0, std=0.1, identified=1):
         (fit_of(False, True), "stages that stopped before they converged: stage 0"),
         (
             fit_of(True, std=np.nan, identified=0),
-            "0 of 1 directions of the coefficients apart; held at their start: friction",
+            "0 of 1 directions of the coefficients; held at their start: friction",
         ),
         (fit_of(True, rmse=60.0, validated=60.0), "residuals larger than at the start: F_y"),
         (fit_of(True, validated=21.0), "errors on rows left out in a fold are more than twice the fit's RMSE: F_y"),
@@ -189,7 +189,7 @@ def refused(folder, *arguments, data=None, product="out.toml"):
         (["--start", "a.txt"], "--start a.txt: suffix '.txt'; it must end in one of .tir, .toml"),
         (["--model", "brush", "--side", "left"], "--side left: only a property file (.tir) has a side"),
         (["--model", "brush", "--measured", "F_q"], "--measured = 'F_q': must be one of 'F_x'"),
-        (["--model", "brush", "--measured", ","], "--measured ',': must name one of F_x"),
+        (["--model", "brush", "--measured", ","], "--measured ',': must name at least one of F_x"),
         (["--model", "brush", "--measured", "F_y,F_x"], "measured: F_x is not in"),
         (["--model", "brush", "--bounds", "friction=1"], "--bounds friction=1: must be NAME=LOW:HIGH, such as"),
         (["--model", "brush", "--bounds", "friction=2:1"], "--bounds friction=2:1: 2 must be less than 1"),

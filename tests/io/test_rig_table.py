@@ -91,7 +91,7 @@ def test_joined_files_tell_the_same_inputs(csv, tydex):
         ("Fz,Fy\n4000,1\n", "no slip among the columns Fz, Fy"),
         ("Fz,alpha\n4000,0.1\n", "no measurement: one of F_x"),
         ("Fz,alpha,Fy\n4000,0.1,\n", "no measurement: one of F_x"),
-        ("Fz,alpha,Fy\n-4000,0.1,1\n", "the median load is -4000: it must be positive .*--axes sae"),
+        ("Fz,alpha,Fy\n-4000,0.1,1\n", "the median load is -4000: it must be positive.*--axes sae"),
         ("Fz,alpha,Fy\n4000,0.1,1\n4000,,1\n", "slip_angle = nan in row 1: must be finite"),
         ("Fz,alpha,Vx,Fy\n4000,0.1,-3,1\n", "speed = -3 in row 0: must be at least 0"),
         ("Fz,alpha,P,Fy\n4000,0.1,2e5,1\n4000,0.1,0,1\n", "pressure = 0 in row 1: must be positive"),
