@@ -249,8 +249,13 @@ def _inputs(driven: Driven, found: Solution) -> dict:
 
 
 def _units(driven: Driven, channels: Mapping) -> dict:
-    units = driven.car.vehicle.units
-    return {name: units[name.removeprefix(TRUTH)] for name in channels}
+    vehicle = driven.car.vehicle
+    lacking = dict.fromkeys(name for channel in channels if (name := channel.removeprefix(TRUTH)) not in vehicle.units)
+    if lacking:
+        raise InputError(
+            f"{vehicle_name(vehicle)}.units: has no {', '.join(lacking)}: each input and output must have a unit."
+        )
+    return {name: vehicle.units[name.removeprefix(TRUTH)] for name in channels}
 
 
 def device_rows(suite: Suite, duration: float) -> np.ndarray:

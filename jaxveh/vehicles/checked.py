@@ -22,8 +22,7 @@ def with_checked_results(evaluate: Callable) -> Callable:
 
 
 def check_results(vehicle: Any, results: Any) -> None:
-    """Raise `InputError` unless `results` are the rates, of the vehicle's own `state_type`, and a NamedTuple of outputs, and each
-    state, input and output has a unit."""
+    """Raise `InputError` unless `results` are the rates, of the vehicle's own `state_type`, and a NamedTuple of outputs."""
     who = f"{type(vehicle).__name__}.evaluate"
     if not (isinstance(results, tuple) and len(results) == 2):
         kind = f"{len(results)} results" if type(results) is tuple else type(results).__name__
@@ -35,12 +34,6 @@ def check_results(vehicle: Any, results: Any) -> None:
         raise InputError(f"{who}: its first result is {_kind(rates)}: must be {_kind(vehicle.state_type)}.{order}")
     if not hasattr(outputs, "_fields"):
         raise InputError(f"{who}: its second result is {_kind(outputs)}: must be a NamedTuple of outputs.")
-    units = vehicle.units
-    lacking = [name for name in dict.fromkeys((*fields, *vehicle.inputs, *outputs._fields)) if name not in units]
-    if lacking:
-        raise InputError(
-            f"{type(vehicle).__name__}.units: has no {', '.join(lacking)}: must have a unit for each state, input and output."
-        )
 
 
 def _kind(thing: Any) -> str:

@@ -34,7 +34,9 @@ def test_the_speed_is_that_of_the_recommended_method(capsys):
     np.testing.assert_array_equal(found["v_x"], estimators.speed.estimate(method_logs.CAR, drive)["v_x"])
     error = np.asarray(found["v_x"]) - np.asarray(log()["v_x"])
     assert np.sqrt(np.mean(error**2)) < 0.02 * np.mean(log()["v_x"])
-    assert "note: a.csv: there is no v_x: it is estimated from the wheel speeds" in " ".join(capsys.readouterr().out.split())
+    assert "note: a.csv: there is no v_x: it is estimated from the wheel speeds" in " ".join(
+        capsys.readouterr().out.split()
+    )
 
 
 @pytest.mark.parametrize("what", [("--as-told",), ("--what", "bank")])
@@ -44,7 +46,9 @@ def test_programs_take_such_a_log(tmp_path, what):
     for name, drive in {"with": log(), "without": log("v_x", "speed")}.items():
         io.write_recording(drive, tmp_path / f"{name}.csv")
         out = tmp_path / f"{name}.out.csv"
-        result = run("estimate", tmp_path / f"{name}.csv", "--vehicle", tmp_path / "car.toml", "-o", out, *what, "--anyway")
+        result = run(
+            "estimate", tmp_path / f"{name}.csv", "--vehicle", tmp_path / "car.toml", "-o", out, *what, "--anyway"
+        )
         assert result.exit_code == 0, result.output
         assert ("there is no v_x" in " ".join(result.stdout.split())) == (name == "without")
         frame = np.genfromtxt(out, delimiter=",", names=True, deletechars="")

@@ -59,7 +59,9 @@ def check_estimates() -> None:
     assert jax.numpy.isfinite(slope.prior.mean.front_D)
     # One leaf alone is differentiated: each jax has rules of its own for the zeros of the others.
     at = lambda value: eqx.tree_at(lambda model: model.prior.mean.front_D, model, value)
-    slope = jax.grad(lambda value: jaxveh.run(filters.Unscented(), at(value), drive).log_likelihood)(model.prior.mean.front_D)
+    slope = jax.grad(lambda value: jaxveh.run(filters.Unscented(), at(value), drive).log_likelihood)(
+        model.prior.mean.front_D
+    )
     assert jax.numpy.isfinite(slope)
 
 

@@ -93,7 +93,7 @@ BAD = {
     '[vary]\n"car.mass" = {from = 0.0, to = 2.0, scale = "log"}': "a logarithmic range must be positive",
     '[vary]\n"car.mass" = {from = 1.0, to = 2.0, steps = 3}': "no key 'steps'",
     '[vary]\n"drive.manoeuvre" = ["slalom", "slalom"]': "has a value twice",
-    '[vary]\n"car.mass" = [1.0]\ncar.mass = [2.0]': "car_mass twice",
+    '[vary]\n"car.mass" = [1.0]\ncar.mass = [2.0]': "car_mass is there twice",
     "[vary]\nfilter = 3": "must be a list of names, or a table of labels",
     '[vary]\nfilter = ["extended", "no"]': "no filter 'no'",
     "[vary.samples]\ncount = 3\nranges = {\"car.mass\" = [1.0, 2.0]}": "powers of two",

@@ -69,7 +69,6 @@ MISTAKES = {
     RatesAlone: r"RatesAlone.evaluate: returned .*: must return two, \(rates, outputs\)",
     Three: r"Three.evaluate: returned 3 results: must return two",
     Dictionary: r"Dictionary.evaluate: its second result is dict: must be a NamedTuple",
-    WithoutUnit: r"WithoutUnit.units: has no sideslip: must have a unit for each state, input and output",
 }
 
 
@@ -80,6 +79,11 @@ def test_each_mistake_is_said_by_simulation_and_by_filters(kind):
         jaxveh.simulate(car, manoeuvres.double_lane_change(20.0, 0.02), dt=0.02)
     with pytest.raises(InputError, match=MISTAKES[kind]):
         estimators.state_space(car, sensors.esc(yaw_rate=0.005, a_y=0.1))
+
+
+def test_an_output_without_a_unit_is_named():
+    with pytest.raises(InputError, match=r"WithoutUnit.units: has no sideslip: each input and output must have a unit"):
+        jaxveh.simulate(WithoutUnit(**PARAMETERS), manoeuvres.double_lane_change(20.0, 0.02), dt=0.02)
 
 
 def test_a_sound_vehicle_answers_as_before():
