@@ -57,7 +57,7 @@ def test_axes_told_wrongly_are_noticed(data, true, told):
     written = {name: -values if name in FLIPS[true] else values for name, values in ours.items()}
     columns = to_ours(written, told)
     if "load" in {*FLIPS[true]} ^ {*FLIPS[told]}:
-        with pytest.raises(InputError, match="load = -.*--axes sae"):
+        with pytest.raises(InputError, match="load is -.*--axes sae"):
             RigTable(**columns)
         return
     found = wrong_signs(RigTable(**columns))
