@@ -2,15 +2,16 @@
 
 `tests/recorded/seconds.json` has the seconds that one case of a test function took when last recorded, for functions that take
 longer than `BUDGET`. Beyond it a function's time grows with the square root of the time of all its cases: at least one case
-runs, the others are left to `-m full`. Each function of a file starts at another case, so that most members of a class (every
-filter, every method) meet some test. A case that takes longer than `LONGEST` is `thorough`. A function that is not on record
-runs whole, so that a new one is never left out.
+runs, the others are left to `-m full`. Each function starts at a case of its own, which its name decides: most members of a
+class (every filter, every method) meet some test, and a file alone runs the cases that it runs among all. A case that takes
+longer than `LONGEST` is `thorough`. A function that is not on record runs whole, so that a new one is never left out.
 
 `JAXVEH_SECONDS=1 python -m pytest` records them again.
 """
 
 import json
 import math
+import zlib
 from pathlib import Path
 
 import pytest
@@ -35,9 +36,9 @@ def keep_to_budget(items):
     for item in items:
         if not any(item.get_closest_marker(mark) for mark in LEFT_OUT):
             cases.setdefault(function_of(item.nodeid), []).append(item)
-    for turn, (name, members) in enumerate(cases.items()):
+    for name, members in cases.items():
         each = seconds.get(name, 0.0)
-        kept = spread_evenly(len(members), number_kept(each, len(members)), 7 * turn)
+        kept = spread_evenly(len(members), number_kept(each, len(members)), zlib.crc32(name.encode()))
         for place, item in enumerate(members):
             if place not in kept:
                 item.add_marker(pytest.mark.full)

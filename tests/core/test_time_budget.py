@@ -31,6 +31,32 @@ def test_cases_are_spread_evenly_and_begin_anywhere(first):
             assert max(gaps) - min(gaps) <= 1
 
 
+class Item:
+    """A case that pytest has collected."""
+
+    def __init__(self, nodeid):
+        self.nodeid, self.marks = nodeid, []
+
+    def get_closest_marker(self, name):
+        return None
+
+    def add_marker(self, mark):
+        self.marks.append(mark.name)
+
+
+def test_a_file_alone_runs_the_cases_that_it_runs_among_all(tmp_path, monkeypatch):
+    monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
+    time_budget.RECORD.write_text(json.dumps({"a.py::slow": 0.5, "b.py::slow": 0.5, "b.py::long": 9.0}))
+    files = {file: [Item(f"tests/{file}.py::{f}[{k}]") for f in ("slow", "long") for k in range(40)] for file in "ab"}
+    time_budget.keep_to_budget([*files["a"], *files["b"]])
+    alone = [Item(item.nodeid) for item in files["b"]]
+    time_budget.keep_to_budget(alone)
+    assert [item.marks for item in alone] == [item.marks for item in files["b"]]
+    marks = [tuple(item.marks) for item in alone]
+    assert marks[:40].count(()) == number_kept(0.5, 40) and marks[40:].count(("thorough",)) == number_kept(9.0, 40)
+    assert not any(item.marks for item in files["a"][40:])
+
+
 def test_what_did_not_run_keeps_its_seconds(tmp_path, monkeypatch):
     monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
     record_seconds({"tests/a.py::slow[1]": 2.0, "tests/a.py::slow[2]": 4.0, "tests/a.py::quick": 0.1})
