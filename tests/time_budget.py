@@ -3,8 +3,9 @@
 `tests/recorded/seconds.json` has the seconds that one case of a test function took when last recorded, for functions that take
 longer than `BUDGET`. Beyond it a function's time grows with the square root of the time of all its cases: at least one case
 runs, the others are left to `-m full`. Each function starts at a case of its own, which its name decides: most members of a
-class (every filter, every method) meet some test, and a file alone runs the cases that it runs among all. A case that takes
-longer than `LONGEST` is `thorough`. A function that is not on record runs whole, so that a new one is never left out.
+class (every filter, every method) meet some test, and a file alone runs the cases that it runs among all. Cases that take
+longer than `LONGEST` are `thorough`, the quickest functions of a file first, for `LONG_BUDGET` seconds a file; the others are
+left to `-m full` too. A function that is not on record runs whole, so that a new one is never left out.
 
 `JAXVEH_SECONDS=1 python -m pytest` records them again.
 """
@@ -16,8 +17,8 @@ from pathlib import Path
 
 import pytest
 
-BUDGET, LONGEST = 1.0, 5.0
-"""Seconds a test function, and a case, on the machine on which they were recorded (one of sixteen workers)."""
+BUDGET, LONGEST, LONG_BUDGET = 0.5, 2.5, 10.0
+"""Seconds a test function, a case, and a file's long cases, on a slow machine of two cores; a quick one takes 0.4 of them."""
 
 RECORD = Path(__file__).parent / "recorded" / "seconds.json"
 
@@ -36,14 +37,26 @@ def keep_to_budget(items):
     for item in items:
         if not any(item.get_closest_marker(mark) for mark in LEFT_OUT):
             cases.setdefault(function_of(item.nodeid), []).append(item)
+    long: dict = {}
     for name, members in cases.items():
         each = seconds.get(name, 0.0)
         kept = spread_evenly(len(members), number_kept(each, len(members)), zlib.crc32(name.encode()))
         for place, item in enumerate(members):
             if place not in kept:
                 item.add_marker(pytest.mark.full)
-            elif each > LONGEST:
-                item.add_marker(pytest.mark.thorough)
+        if each > LONGEST:
+            long.setdefault(name.partition("::")[0], []).append((each * len(kept), name, [members[k] for k in kept]))
+    for functions in long.values():
+        mark_long(functions)
+
+
+def mark_long(functions):
+    """Mark the long cases of a file's functions, each `(seconds, name, cases)`."""
+    spent = 0.0
+    for took, _, members in sorted(functions, key=lambda function: function[:2]):
+        spent += took
+        for item in members:
+            item.add_marker(pytest.mark.thorough if spent <= LONG_BUDGET else pytest.mark.full)
 
 
 def number_kept(each, most):

@@ -78,7 +78,7 @@ class PredictionErrorProblem(AbstractFilterProblem):
 
     def search(self, z, max_steps, tolerance):
         found, state = score(self, z, None, tolerance, jnp.asarray(max_steps))
-        return SearchEnd(found, state.steps, state.done)
+        return SearchEnd(found, state.steps, state.done, state.at.cost, uncertainty(state.at))
 
     def covariance(self, z):
         return uncertainty(quadratic(z, self))
@@ -133,8 +133,10 @@ def _cost(problem: PredictionErrorProblem, parts: Parts):
     return jnp.sum(problem.counts * (0.5 * squares + by_recording(parts.levels) + parts.constant))
 
 
-def _cost_at(z, problem: PredictionErrorProblem):
-    return problem.cost(z)
+def _scalar(z, problem: PredictionErrorProblem):
+    """In the place of the cost, of which the solver needs the shape alone: it has its values from `quadratic`. To trace the
+    filter once more would take a second or two."""
+    return jnp.zeros((), z.dtype)
 
 
 def quadratic(z, problem: PredictionErrorProblem) -> Quadratic:
@@ -163,7 +165,7 @@ def score(problem: PredictionErrorProblem, z, state, tolerance: float, limit):
     """Fisher scoring from z, or continued from a `state`, up to `limit` steps in all: the end point and the state."""
     solver = FisherScoring(atol=tolerance, quadratic=quadratic)
     options = {"unit": problem.unit(), "limit": limit} | ({} if state is None else {"state": state})
-    found = optx.minimise(_cost_at, solver, z, problem, options=options, max_steps=None, throw=False)
+    found = optx.minimise(_scalar, solver, z, problem, options=options, max_steps=None, throw=False)
     return found.value, found.state
 
 

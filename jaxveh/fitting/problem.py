@@ -15,11 +15,16 @@ from jaxveh._core.parameters import Parameters
 
 
 class SearchEnd(NamedTuple):
-    """The end of a search: the coordinates `z` (n,), the number of `steps`, and whether it `converged`."""
+    """The end of a search: the coordinates `z` (n,), the number of `steps`, and whether it `converged`.
+
+    `cost`, `uncertainty`: those of the problem at z (`AbstractProblem.cost`, `covariance`), where the search knows them.
+    """
 
     z: Any
     steps: Any
     converged: Any
+    cost: Any = None
+    uncertainty: tuple[Any, Any] | None = None
 
 
 class AbstractProblem(eqx.Module):

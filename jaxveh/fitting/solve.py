@@ -37,29 +37,57 @@ def solve(
 
 @eqx.filter_jit
 def _solve(problem: AbstractProblem, start, tolerance, *, max_steps: int, standard_errors: bool) -> Fit:
-    start = problem.start() if start is None else start
-    found = optimum(problem, lax.stop_gradient(start), max_steps=max_steps, tolerance=tolerance)
-    return fit_at(problem, found, problem.cost(found.z), problem.covariance(found.z) if standard_errors else None)
+    start = lax.stop_gradient(problem.start() if start is None else start)
+    found = conclusion(problem, start, max_steps=max_steps, tolerance=tolerance, standard_errors=standard_errors)
+    return fit_at(problem, found, found.cost, found.uncertainty)
 
 
 @eqx.filter_custom_jvp
 def optimum(problem: AbstractProblem, start, *, max_steps: int, tolerance) -> SearchEnd:
-    """The end of a search from the coordinates `start` (n,)."""
-    return problem.search(start, max_steps, tolerance)
+    """The end of a search from the coordinates `start` (n,), without cost and uncertainty."""
+    return problem.search(start, max_steps, tolerance)._replace(cost=None, uncertainty=None)
 
 
 @optimum.def_jvp
 def _of_optimum(primals, tangents, **settings):
-    problem, start = primals
-    found = optimum(problem, start, **settings)
-    moved, _ = tangents
+    found = optimum(*primals, **settings)
+    return found, SearchEnd(motion(primals[0], found.z, tangents[0]), None, None)
+
+
+@eqx.filter_custom_jvp
+def conclusion(problem: AbstractProblem, start, *, max_steps: int, tolerance, standard_errors: bool) -> SearchEnd:
+    """The end of a search from the coordinates `start` (n,), with the cost there, and with the uncertainty if asked for.
+
+    What the search knows of its end is not computed again, which halves the compilation where the cost is a filter's.
+    """
+    found = problem.search(start, max_steps, tolerance)
+    cost, uncertainty = found.cost, found.uncertainty if standard_errors else None
+    if cost is None:
+        cost = problem.cost(found.z)
+    if uncertainty is None and standard_errors:
+        uncertainty = problem.covariance(found.z)
+    return found._replace(cost=cost, uncertainty=uncertainty)
+
+
+@conclusion.def_jvp
+def _of_conclusion(primals, tangents, *, standard_errors, **settings):
+    problem, moved = primals[0], tangents[0]
+    found = conclusion(*primals, standard_errors=standard_errors, **settings)
+    at = lambda problem, z: (problem.cost(z), problem.covariance(z) if standard_errors else None)
+    change = motion(problem, found.z, moved)
+    _, (cost, uncertainty) = eqx.filter_jvp(at, (problem, found.z), (moved, change))
+    return found, SearchEnd(change, None, None, cost, uncertainty)
+
+
+def motion(problem: AbstractProblem, z, moved):
+    """The change (n,) of the optimum z with the tangent `moved` of the problem."""
     is_none = lambda leaf: leaf is None
     still = jax.tree.map(is_none, moved, is_leaf=is_none)
     held, free = eqx.partition(problem, still, is_leaf=is_none)
-    matrix, cross = curvature(lambda z, free: eqx.combine(free, held).cost(z), found.z, free)
+    matrix, cross = curvature(lambda z, free: eqx.combine(free, held).cost(z), z, free)
     parts = jax.tree.map(lambda row, tangent: jnp.tensordot(row, tangent, tangent.ndim), cross, moved)
-    change = sum(jax.tree.leaves(parts), start=jnp.zeros_like(found.z))
-    return found, SearchEnd(-jnp.linalg.solve(matrix, change), None, None)
+    change = sum(jax.tree.leaves(parts), start=jnp.zeros_like(z))
+    return -jnp.linalg.solve(matrix, change)
 
 
 def curvature(cost, z, free):

@@ -89,7 +89,7 @@ def run(*arguments, folder=ROOT):
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_smoke_run_writes_numbers_and_manifest(tmp_path):
     done = run("--smoke", "--only", "unscented/float64-3", "--json", str(tmp_path / "a.json"), "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr

@@ -17,7 +17,7 @@ pytestmark = [
 # This machine's vectors, 32-byte ones as on a machine without AVX-512, and no AVX at all (slow to compile).
 FLAGS = [
     pytest.param((), id="native"),
-    pytest.param(("-mno-avx512f",), id="avx2"),
+    pytest.param(("-mno-avx512f",), id="avx2", marks=pytest.mark.full),
     pytest.param(("-march=x86-64",), id="plain", marks=pytest.mark.full),
 ]
 

@@ -23,9 +23,10 @@ def test_spans_that_overlap_count_once():
     ("command", "said"),
     [
         (("starts", "--only", "simulate", "--rounds", "1"), ("simulate, cold", "simulate, warm", "reading back")),
-        (
+        pytest.param(
             ("million_runs", "--runs", "40", "--cars", "20", "--processes", "1"),
             ("40 runs", "7-DOF car, 20 runs", "a store in"),
+            marks=pytest.mark.full,
         ),
     ],
 )

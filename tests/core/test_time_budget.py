@@ -4,7 +4,7 @@ import json
 
 import pytest
 import time_budget
-from time_budget import BUDGET, function_of, number_kept, record_seconds, spread_evenly
+from time_budget import BUDGET, LONG_BUDGET, function_of, number_kept, record_seconds, spread_evenly
 
 
 @pytest.mark.parametrize("most", [1, 2, 7, 67])
@@ -46,15 +46,24 @@ class Item:
 
 def test_a_file_alone_runs_the_cases_that_it_runs_among_all(tmp_path, monkeypatch):
     monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
-    time_budget.RECORD.write_text(json.dumps({"a.py::slow": 0.5, "b.py::slow": 0.5, "b.py::long": 9.0}))
+    time_budget.RECORD.write_text(json.dumps({"a.py::slow": 0.5, "b.py::slow": 0.5, "b.py::long": 3.0}))
     files = {file: [Item(f"tests/{file}.py::{f}[{k}]") for f in ("slow", "long") for k in range(40)] for file in "ab"}
     time_budget.keep_to_budget([*files["a"], *files["b"]])
     alone = [Item(item.nodeid) for item in files["b"]]
     time_budget.keep_to_budget(alone)
     assert [item.marks for item in alone] == [item.marks for item in files["b"]]
     marks = [tuple(item.marks) for item in alone]
-    assert marks[:40].count(()) == number_kept(0.5, 40) and marks[40:].count(("thorough",)) == number_kept(9.0, 40)
+    assert marks[:40].count(()) == number_kept(0.5, 40) and marks[40:].count(("thorough",)) == number_kept(3.0, 40)
     assert not any(item.marks for item in files["a"][40:])
+
+
+def test_of_a_files_long_cases_the_quickest_run():
+    share = LONG_BUDGET / 10
+    takes = {"c": 4 * share, "a": 3 * share, "b": 5 * share, "d": 20 * share}
+    cases = {name: Item(name) for name in takes}
+    time_budget.mark_long([(took, name, [cases[name]]) for name, took in takes.items()])
+    marks = {name: item.marks for name, item in cases.items()}
+    assert marks == {"a": ["thorough"], "c": ["thorough"], "b": ["full"], "d": ["full"]}
 
 
 def test_what_did_not_run_keeps_its_seconds(tmp_path, monkeypatch):

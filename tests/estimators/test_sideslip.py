@@ -257,9 +257,14 @@ CALIBRATED = {
 """By log and direction: RMSE of the half that was not calibrated on, and of the open loop, degrees; of the Genesis, whose
 reference is turned by half a degree, without the constant part."""
 
+IN_CI = ("ferrari_250lm", "forward")
+"""The one that `.ci/run` has; the others are left to the full run."""
 
-@pytest.mark.studies
-@pytest.mark.parametrize(("log", "direction"), CALIBRATED)
+
+@pytest.mark.parametrize(
+    ("log", "direction"),
+    [pytest.param(*case, marks=pytest.mark.studies if case == IN_CI else pytest.mark.full) for case in CALIBRATED],
+)
 def test_real_logs_calibrated_blind_on_the_other_half(log, direction):
     recording, car = io.read_recording(shared(f"{log}_100hz.csv")), io.read_car(shared(f"{log}.toml"))
     middle = 0.5 * (float(recording.time[0]) + float(recording.time[-1]))

@@ -21,7 +21,7 @@ from test_maximum_likelihood import LEVELS
 from test_maximum_likelihood import model as diffuse
 
 from jaxveh import InputError, Parameters, Recording, filters, fitting, io, tyres
-from jaxveh.fitting.solve import MOST_STEPS
+from jaxveh.fitting.solve import MOST_STEPS, optimum
 
 FILTER = filters.Unscented()
 YEARS = Recording(np.arange(1871.0, 1911.0), {"flow": NILE[:40]})
@@ -220,6 +220,29 @@ def test_derivatives_equal_differences(problem, changed, slopes):
     assert (np.abs(differences) > 1e-5).all()
     np.testing.assert_allclose(reverse, differences, rtol=1e-4, atol=1e-9)
     np.testing.assert_allclose(forward, reverse, rtol=1e-8)
+
+
+def test_cost_and_uncertainty_are_those_of_the_problem_at_the_optimum(case, problem, solved):
+    """Whether the search knew them or not."""
+    z = eqx.filter_jit(optimum)(problem, problem.start(), max_steps=MOST_STEPS, tolerance=jnp.asarray(case.tolerance)).z
+    cost, (covariance, _) = eqx.filter_jit(lambda problem: (problem.cost(z), problem.covariance(z)))(problem)
+    np.testing.assert_allclose(solved.cost, cost, rtol=1e-10)
+    np.testing.assert_allclose(solved.covariance, covariance, rtol=1e-6)
+
+
+def test_derivatives_of_cost_and_uncertainty_equal_differences(case, changed):
+    """With respect to data, noise and prior together."""
+
+    def fitted(share):
+        fit = fitting.solve(changed(share * jnp.asarray([0.3, 1.0, -0.5])), tolerance=case.tolerance)
+        return jnp.append(fit.covariance.ravel(), fit.cost)
+
+    compiled, h = jax.jit(fitted), 2e-3
+    _, slope = jax.jit(lambda: jax.jvp(fitted, (jnp.asarray(0.0),), (jnp.asarray(1.0),)))()
+    near, back, far, behind = (compiled(jnp.asarray(share)) for share in (h, -h, 2 * h, -2 * h))
+    difference = (8 * (near - back) - (far - behind)) / (12 * h)
+    assert (np.abs(difference) > 1e-9).all()
+    np.testing.assert_allclose(slope, difference, rtol=1e-3, atol=1e-3 * np.abs(difference[:-1]).max())
 
 
 def least(cost_and_slope, start):

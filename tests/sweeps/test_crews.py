@@ -163,7 +163,7 @@ def wait_for_chunks(program, count):
     raise AssertionError(f"the program ended with {program.wait()}")
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_a_client_that_is_killed_and_begun_again(tmp_path, whole):
     path = tmp_path / "sweep.zarr"
     for count in (3, 11):
@@ -203,7 +203,7 @@ def scheduler(port):
     return address, kept, worker
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_a_scheduler_that_is_killed(tmp_path, whole):
     path = tmp_path / "sweep.zarr"
     address, first, worker = scheduler(18786)
