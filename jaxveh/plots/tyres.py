@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -29,40 +29,71 @@ SPEED = 16.7
 """Default speed, m/s: that of most rigs."""
 
 
+class Panel(NamedTuple):
+    """A panel's axes in words, and its `lines`: x, y, and settings of matplotlib."""
+
+    x: str
+    y: str
+    lines: list[tuple[Any, Any, dict[str, Any]]]
+
+
 def tyre(law: AbstractTyre, loads: Sequence[float] = LOADS, *, speed: float = SPEED, figure: Any = None) -> Any:
     """Draw the forces of a tyre over slip, and in combined slip.
 
     Lateral force and aligning moment over slip angle, and longitudinal force over slip ratio, are at `loads` (N); lateral over
-    longitudinal force is at several slip angles and the middle load; all are at a forward `speed` (m/s). A tyre with states is
-    in its steady state. **Returns** the figure; `figure`: the figure to draw into.
+    longitudinal force is at several slip angles and the middle load; all are at a forward `speed` (m/s). What the law does not
+    have, such as the aligning moment of a lateral law, has no panel. A tyre with states is in its steady state. **Returns** the
+    figure; `figure`: the figure to draw into.
     """
-    angle, ratio = np.linspace(-SLIP_ANGLE, SLIP_ANGLE, POINTS), np.linspace(-SLIP_RATIO, SLIP_RATIO, POINTS)
+    across, along, moment = _over_slip(law, loads, speed)
+    both = _varies(across) and _varies(along)
+    panels = [panel for panel in (across, along, moment) if _varies(panel)] or [across]
+    if both:
+        panels.append(_combined(law, loads[len(loads) // 2], speed))
+    rows, columns = (2, 2) if len(panels) == 4 else (1, len(panels))
     with style():
-        figure = new_figure(5.2) if figure is None else figure
-        axes = figure.subplots(2, 2)
-        for i, load in enumerate(loads):
-            settings = {"color": CYCLE[i % len(CYCLE)], "label": f"{load / 1e3:g} kN"}
-            across, along = (forces_at(law, load, *slips, speed) for slips in ((angle, 0.0), (0.0, ratio)))
-            axes[0, 0].plot(np.degrees(angle), across.F_y / 1e3, **settings)
-            axes[0, 1].plot(100 * ratio, along.F_x / 1e3, **settings)
-            axes[1, 0].plot(np.degrees(angle), across.M_z, **settings)
-        middle = loads[len(loads) // 2]
-        wide = np.linspace(-1.0, 1.0, 4 * POINTS)
-        for i, degrees in enumerate(COMBINED):
-            found = forces_at(law, middle, np.radians(degrees), wide, speed)
-            shade = str(0.75 - 0.75 * i / len(COMBINED))
-            axes[1, 1].plot(found.F_x / 1e3, found.F_y / 1e3, color=shade, label=f"{degrees:g}°")
-        axes[1, 1].legend(title="slip angle", loc="lower center", ncols=2, handlelength=1.4)
-        for ax, x, y in (
-            (axes[0, 0], "slip angle [°]", "lateral force [kN]"),
-            (axes[0, 1], "slip ratio [%]", "longitudinal force [kN]"),
-            (axes[1, 0], "slip angle [°]", "aligning moment [N m]"),
-            (axes[1, 1], "longitudinal force [kN]", f"lateral force [kN] at {middle / 1e3:g} kN"),
-        ):
-            ax.set_xlabel(x)
-            ax.set_ylabel(y)
-        legend(figure, axes[:1])
+        figure = new_figure(2.6 * rows) if figure is None else figure
+        axes = figure.subplots(rows, columns, squeeze=False)
+        for ax, panel in zip(axes.flat, panels, strict=True):
+            for x, y, settings in panel.lines:
+                ax.plot(x, y, **settings)
+            ax.set_xlabel(panel.x)
+            ax.set_ylabel(panel.y)
+        if both:
+            axes.flat[-1].legend(title="slip angle", loc="lower center", ncols=2, handlelength=1.4)
+        legend(figure, axes.flat[:1])
     return figure
+
+
+def _over_slip(law: AbstractTyre, loads: Sequence[float], speed: float) -> tuple[Panel, Panel, Panel]:
+    """Lateral force, longitudinal force and aligning moment in pure slip, a line for each load."""
+    angle, ratio = np.linspace(-SLIP_ANGLE, SLIP_ANGLE, POINTS), np.linspace(-SLIP_RATIO, SLIP_RATIO, POINTS)
+    across = Panel("slip angle [°]", "lateral force [kN]", [])
+    along = Panel("slip ratio [%]", "longitudinal force [kN]", [])
+    moment = Panel("slip angle [°]", "aligning moment [N m]", [])
+    for i, load in enumerate(loads):
+        settings = {"color": CYCLE[i % len(CYCLE)], "label": f"{load / 1e3:g} kN"}
+        lateral, longitudinal = (forces_at(law, load, *slips, speed) for slips in ((angle, 0.0), (0.0, ratio)))
+        across.lines.append((np.degrees(angle), lateral.F_y / 1e3, settings))
+        along.lines.append((100 * ratio, longitudinal.F_x / 1e3, settings))
+        moment.lines.append((np.degrees(angle), lateral.M_z, settings))
+    return across, along, moment
+
+
+def _combined(law: AbstractTyre, load: float, speed: float) -> Panel:
+    """Lateral over longitudinal force, a line for each slip angle."""
+    panel = Panel("longitudinal force [kN]", f"lateral force [kN] at {load / 1e3:g} kN", [])
+    wide = np.linspace(-1.0, 1.0, ROOM)
+    for i, degrees in enumerate(COMBINED):
+        found = forces_at(law, load, np.radians(degrees), wide, speed)
+        shade = str(0.75 - 0.75 * i / len(COMBINED))
+        panel.lines.append((found.F_x / 1e3, found.F_y / 1e3, {"color": shade, "label": f"{degrees:g}°"}))
+    return panel
+
+
+def _varies(panel: Panel) -> bool:
+    """Whether any of its lines is something else than zero."""
+    return any(np.any(np.asarray(y) != 0) for _, y, _ in panel.lines)
 
 
 def forces_at(law: AbstractTyre, load: float, slip_angle: Any, slip_ratio: Any, speed: float | None = None) -> Any:

@@ -61,6 +61,11 @@ def test_the_tyre_figure_shows_the_law_s_forces(brush):
     assert combined.get_ylabel() == "lateral force [kN] at 4 kN"
 
 
+def test_what_a_law_does_not_have_has_no_panel(lateral_only):
+    (across,) = plots.tyre(lateral_only).axes
+    assert across.get_ylabel() == "lateral force [kN]" and len(across.get_lines()) == 3
+
+
 def test_the_limit_of_a_brush_is_a_circle(brush):
     figure = plots.friction_ellipse(brush, LOAD, np.radians([0.0, 3.0]))
     (ax,) = figure.axes
