@@ -12,7 +12,7 @@ from pathlib import Path
 
 import jax
 import pytest
-from time_budget import keep_to_budget, record_seconds
+from time_budget import keep_one_colour, keep_to_budget, record_seconds
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
@@ -33,8 +33,6 @@ MOST_MAPPINGS = 45000
 
 LOOKED_AFTER = 25
 """Programs compiled: a filter's takes up to 500 mappings."""
-
-COLOURS = 6
 
 # Traces and programs are many objects that live long; looking through them for cycles after every few hundred new ones took 8 %
 # of the tests' time.
@@ -64,14 +62,7 @@ def keep_programs(config):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Of a `product` one case in six stays, the others are left to `-m full`: each value of a parameter meets a sixth of the
-    others', and each test has a sixth of the cases, as the fields of one colour on a board of six."""
-    order: dict = {}
-    for item in items:
-        if item.get_closest_marker("product") and hasattr(item, "callspec"):
-            place = order.setdefault((item.path, item.originalname), len(order)) + sum(item.callspec.indices.values())
-            if place % COLOURS:
-                item.add_marker(pytest.mark.full)
+    keep_one_colour(items)
     keep_to_budget(items)
 
 

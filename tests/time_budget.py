@@ -22,6 +22,9 @@ BUDGET, LONGEST, LONG_BUDGET = 0.5, 2.0, 6.0
 
 What tests of a file share is taken by the first that runs: the record has the larger numbers of two selections."""
 
+COLOURS = 6
+"""Of the cases of a `product` one in so many runs by default."""
+
 RECORD = Path(__file__).parent / "recorded" / "seconds.json"
 
 LEFT_OUT = ("full", "peers", "studies", "site")
@@ -31,6 +34,22 @@ LEFT_OUT = ("full", "peers", "studies", "site")
 def function_of(nodeid):
     """`filters/test_x.py::test_some_property` of `tests/filters/test_x.py::test_some_property[a-b]`."""
     return nodeid.partition("[")[0].removeprefix("tests/")
+
+
+def keep_one_colour(items):
+    """Of a `product` one case in six stays, the others are left to `-m full`: each value of a parameter meets a sixth of the
+    others', and each test has a sixth of the cases, as the fields of one colour on a board of six. Of few cases none may have
+    the colour: then one of the next colour stays, so that every test has a case."""
+    functions: dict = {}
+    for item in items:
+        if item.get_closest_marker("product") and hasattr(item, "callspec"):
+            functions.setdefault((item.path, item.originalname), []).append(item)
+    for start, members in enumerate(functions.values()):
+        colours = [(start + sum(item.callspec.indices.values())) % COLOURS for item in members]
+        kept = [place for place, colour in enumerate(colours) if colour == 0] or [colours.index(min(colours))]
+        for place, item in enumerate(members):
+            if place not in kept:
+                item.add_marker(pytest.mark.full)
 
 
 def keep_to_budget(items):

@@ -1,6 +1,7 @@
 """Which cases of a test function run by default."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 import time_budget
@@ -56,6 +57,22 @@ def test_a_file_alone_runs_the_cases_that_it_runs_among_all(tmp_path, monkeypatc
     marks = [tuple(item.marks) for item in alone]
     assert marks[:40].count(()) == number_kept(0.5, 40) and marks[40:].count(("thorough",)) == number_kept(3.0, 40)
     assert not any(item.marks for item in files["a"][40:])
+
+
+@pytest.mark.parametrize("many", [1, 2, 5, 6, 7, 30])
+def test_every_test_of_a_product_has_a_case(many):
+    """Whatever its number of cases, and whichever tests stand before it."""
+    items = []
+    for function in range(13):
+        for k in range(many):
+            item = Item(f"tests/a.py::f{function}[{k}]")
+            item.path, item.originalname, item.callspec = "a.py", f"f{function}", SimpleNamespace(indices={"x": k})
+            item.get_closest_marker = lambda name: name == "product"
+            items.append(item)
+    time_budget.keep_one_colour(items)
+    for function in range(13):
+        kept = [item for item in items if item.originalname == f"f{function}" and not item.marks]
+        assert 1 <= len(kept) <= -(-many // time_budget.COLOURS)
 
 
 def test_of_a_files_long_cases_the_quickest_run():
