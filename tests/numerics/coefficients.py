@@ -86,6 +86,8 @@ RECIPES = {
 def main() -> None:
     for name, (function, bound, degree) in RECIPES.items():
         coefficients = chebyshev_interpolant(function, bound, degree)
+        if name == "SINE_32":
+            coefficients[0] = function(np.longdouble(0))
         print(f"{name} = (\n" + "".join(f"    {float(c)!r},\n" for c in coefficients) + ")")
 
 

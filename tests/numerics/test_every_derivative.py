@@ -287,14 +287,20 @@ def test_in_other_places(name, mode, place):
     np.testing.assert_allclose(found, reference(name, steps), rtol=1e-7, atol=2e-7)
 
 
+DRAWN = ("band_harmonics", "gauss_markov_harmonics", "student_t")
+"""Made of random numbers: those of float32 are others than those of float64."""
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("name", CASES)
 def test_in_float32(name, mode):
-    found = derivatives(in_scan(CASES[name]), mode)(jnp.asarray(POINTS, jnp.float32))
+    points = jnp.asarray(POINTS, jnp.float32)
+    found = derivatives(in_scan(CASES[name]), mode)(points)
     assert found.dtype == jnp.float32
-    np.testing.assert_allclose(found[:, :3], reference(name, 3)[:, :3], rtol=2e-3, atol=2e-3)
-    np.testing.assert_allclose(found[:, 3], reference(name, 3)[:, 3], rtol=2e-2, atol=2e-2)
+    expected = derivatives(one_by_one(CASES[name], 3), "forward")(points) if name in DRAWN else reference(name, 3)
+    np.testing.assert_allclose(found[:, :3], expected[:, :3], rtol=2e-3, atol=2e-3)
+    np.testing.assert_allclose(found[:, 3], expected[:, 3], rtol=2e-2, atol=2e-2)
 
 
 BITS = ("arctan", "log", "sqrt")
