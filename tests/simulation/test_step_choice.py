@@ -36,6 +36,28 @@ def test_a_fast_low_pass_gets_the_steps_that_it_needs():
         simulate(linear(), STEER, fast, solver="explicit", throw=False)
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_the_spectral_radius_is_that_of_the_eigenvalues(dtype):
+    rng = np.random.default_rng(5)
+    drawn = rng.normal(size=(40, 7, 7)) * 10.0 ** rng.uniform(-3, 4, size=(40, 7, 7))
+    turning = np.kron(np.eye(2), [[-3.0, 400.0], [-400.0, -3.0]])
+    dying = np.triu(rng.normal(size=(5, 5)), 1)
+    for matrix in (*drawn, turning, dying, np.zeros((3, 3))):
+        expected = np.max(np.abs(np.linalg.eigvals(matrix)))
+        found = float(stiffness.spectral_radius(jnp.asarray(matrix, dtype)))
+        assert found == pytest.approx(expected, rel=0.02, abs=1e-5 * np.max(np.abs(matrix), initial=1.0))
+    assert np.isnan(stiffness.spectral_radius(jnp.full((2, 2), np.nan)))
+
+
+@pytest.mark.parametrize(("dtype", "near"), [(np.float32, 2e-3), (np.float64, 1e-8)])
+def test_differences_are_the_jacobian(dtype, near):
+    rates = lambda x: jnp.stack([x[0] * jnp.sin(x[1]), x[2] ** 2 - 300.0 * x[0], jnp.cos(x[0] * x[2])])
+    x = jnp.asarray([0.3, -1.2, 25.0], dtype)
+    found = jax.jit(lambda x: stiffness.differences(rates, x))(x)
+    assert found.dtype == dtype
+    np.testing.assert_allclose(found, jax.jacfwd(rates)(x), rtol=near, atol=300 * near)
+
+
 @pytest.mark.parametrize("fast", ["low-pass", "driver"])
 def test_sensors_and_drivers_count_among_the_fastest(fast):
     driver = PathDriver(
