@@ -31,13 +31,11 @@ def _horner(coefficients: tuple[float, ...], t: Array) -> Array:
     return total
 
 
-# The first is -1/6 itself instead of the interpolant's: in float32 sin(pi / 2) and cos(0) are then exactly 1, whether or not
-# multiplications and additions are fused.
 SINE_32 = (
-    -0.16666666666666666,
-    0.008333242135096938,
-    -0.00019822739488631048,
-    2.6347563918116457e-06,
+    -0.16666665846834117,
+    0.008333231002090012,
+    -0.0001982126662316618,
+    2.630077361239679e-06,
 )
 SINE_64 = (
     -0.16666666666666666,

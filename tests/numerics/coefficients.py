@@ -42,9 +42,14 @@ def cosine_remainder(t: Array) -> Array:
     return total
 
 
-def chebyshev_interpolant(function: Callable[[Array], Array], bound: float, degree: int) -> Array:
-    """Coefficients in ascending powers of t of the interpolant of `function` on [0, bound]."""
+def chebyshev_interpolant(
+    function: Callable[[Array], Array], bound: float, degree: int, through_end: bool = False
+) -> Array:
+    """Coefficients in ascending powers of t of the interpolant of `function` on [0, bound]; `through_end`: its last node is the
+    bound, otherwise it lies a little below."""
     count = degree + 1
+    if through_end:
+        bound = 2 * np.longdouble(bound) / (1 + np.cos(np.longdouble(np.pi) / (2 * count)))
     angle = 4 * np.arctan(np.longdouble(1)) * (np.arange(count, dtype=np.longdouble) + 0.5) / count
     values = function(np.longdouble(bound) / 2 * (1 + np.cos(angle)))
     series = [2 / np.longdouble(count) * np.sum(values * np.cos(k * angle)) for k in range(count)]
@@ -68,7 +73,8 @@ TANGENT_BOUND = np.tan(np.pi / 8) ** 2
 LOGARITHM_BOUND = (3 - 2 * np.sqrt(2)) ** 2  # of s = (m - 1) / (m + 1) for m between sqrt(1/2) and sqrt(2)
 
 RECIPES = {
-    "SINE_32": (sine_remainder, SINE_BOUND, 3),
+    # Through the end, so that sin(pi / 2) and cos(0) are exactly 1, with multiplications and additions fused or not.
+    "SINE_32": (sine_remainder, SINE_BOUND, 3, True),
     "SINE_64": (sine_remainder, SINE_BOUND, 7),
     "COSINE_32": (cosine_remainder, SINE_BOUND, 4),
     "COSINE_64": (cosine_remainder, SINE_BOUND, 7),
@@ -84,10 +90,8 @@ RECIPES = {
 
 
 def main() -> None:
-    for name, (function, bound, degree) in RECIPES.items():
-        coefficients = chebyshev_interpolant(function, bound, degree)
-        if name == "SINE_32":
-            coefficients[0] = function(np.longdouble(0))
+    for name, recipe in RECIPES.items():
+        coefficients = chebyshev_interpolant(*recipe)
         print(f"{name} = (\n" + "".join(f"    {float(c)!r},\n" for c in coefficients) + ")")
 
 

@@ -158,7 +158,7 @@ def test_gradients_of_steered_cars_equal_finite_differences(kind, steering):
 
     on_line = lambda s: float(value(jax.tree.map(lambda a, d: a + s * d, arrays, along)))
     expected = (on_line(1e-4) - on_line(-1e-4)) / 2e-4
-    slope, pull = jax.linearize(value, arrays)[1](along), jax.grad(value)(arrays)
+    slope, pull = jax.jvp(value, (arrays,), (along,))[1], jax.grad(value)(arrays)
     np.testing.assert_allclose(slope, expected, rtol=1e-5, atol=1e-7)
     found = sum(np.vdot(g, d) for g, d in zip(jax.tree.leaves(pull), jax.tree.leaves(along), strict=True))
     np.testing.assert_allclose(found, slope, rtol=1e-8, atol=1e-10)
