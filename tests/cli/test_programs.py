@@ -237,7 +237,8 @@ def F_r_of(v_y, yaw_rate, v_x, b, C_r):
 
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory):
-    """A calibration of a log, the car beside it, its numbers and figures, made by one call of `fit`."""
+    """A calibration of a log, the car beside it, its numbers and figures, made by one call of `fit`, which takes long: whoever
+    asks for it is one of the studies."""
     folder = tmp_path_factory.mktemp("kept")
     log, car = write_log(folder, with_steer()), write_car(folder)
     more = ("--car-file", folder / "fitted.toml", "--json", folder / "fit.json", "--out", folder / "figures")
@@ -248,6 +249,7 @@ def kept(tmp_path_factory):
     return folder
 
 
+@pytest.mark.studies
 def test_fit_writes_the_calibration_the_car_and_its_curves(kept):
     found = estimators.read_calibration(kept / "calibration.toml")
     assert found.spans == (estimators.Span(0.0, 29.98, "drive.csv"),)
@@ -263,6 +265,7 @@ def test_fit_writes_the_calibration_the_car_and_its_curves(kept):
     assert (kept / "figures" / "force_curves.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.studies
 def test_a_calibration_that_was_kept_estimates_as_the_process_that_fitted_it(kept):
     log, car = kept / "drive.csv", kept / "car.toml"
     outputs = []
@@ -274,6 +277,8 @@ def test_a_calibration_that_was_kept_estimates_as_the_process_that_fitted_it(kep
     assert outputs[0].read_bytes() == outputs[1].read_bytes()
 
 
+@pytest.mark.full
+@pytest.mark.studies
 def test_several_logs_go_into_a_folder_with_one_calibration(kept):
     logs = [kept / "drive.csv", kept / "again.csv"]
     logs[1].write_text(logs[0].read_text())
@@ -301,6 +306,7 @@ def test_several_logs_go_into_a_folder_with_one_calibration(kept):
     assert "two logs would be written to drive.parquet" in error_line(twice)
 
 
+@pytest.mark.studies
 def test_logs_of_different_cars_are_refused(kept, tmp_path):
     """The other one steers more for the same turn, as a longer car does; less than a check of one log would call an error."""
     table = with_steer()
@@ -340,6 +346,8 @@ def test_a_steering_wheel_steers_by_the_cars_ratio(tmp_path):
     assert "open_loop_sideslip_rmse_deg" not in scores[told] and scores[ratio]["open_loop_sideslip_rmse_deg"] > 0
 
 
+@pytest.mark.full
+@pytest.mark.studies
 def test_a_report_of_one_log_and_of_several(kept):
     pytest.importorskip("bokeh")
     start = ("--calibration", kept / "calibration.toml", "--span", "5:20", "--truth", "v_y")
@@ -377,6 +385,7 @@ def test_a_report_of_one_log_and_of_several(kept):
     assert 'href="#log-1">tuesday.csv<' in text and text.count("Score against the truth") == 2
 
 
+@pytest.mark.studies
 def test_a_report_is_refused_before_any_work(kept, tmp_path):
     pytest.importorskip("bokeh")
     start = ("estimate", kept / "drive.csv", "--calibration", kept / "calibration.toml", "-o", tmp_path / "e.csv")
@@ -402,6 +411,7 @@ def topics_of(path):
     return found
 
 
+@pytest.mark.studies
 def test_an_estimate_as_topics_is_that_of_the_table_with_the_log_beside_it(kept):
     pytest.importorskip("mcap")
     start = (
@@ -434,6 +444,7 @@ def test_an_estimate_as_topics_is_that_of_the_table_with_the_log_beside_it(kept)
     assert without.exit_code == 0 and set(topics_of(kept / "blind.mcap")) == {"/estimate", "/log"}
 
 
+@pytest.mark.studies
 def test_topics_have_no_stamps_below_zero(kept, tmp_path):
     pytest.importorskip("mcap")
     table = with_steer()
@@ -463,12 +474,14 @@ def broken(kept, change):
         (lambda text: text.replace("value = ", "value = 'x' #", 1), "must be a number"),
     ],
 )
+@pytest.mark.studies
 def test_a_calibration_file_that_is_none_is_refused(kept, change, words):
     result = run("estimate", kept / "drive.csv", "--calibration", broken(kept, change), "-o", kept / "never.csv")
     assert words in error_line(result)
     assert not (kept / "never.csv").exists()
 
 
+@pytest.mark.studies
 def test_a_calibration_of_another_car_and_options_that_contradict_it(kept, tmp_path):
     other = write_car(tmp_path, CAR.replace("mass = 1420.0", "mass = 1421.0"))
     start = ("estimate", kept / "drive.csv", "--calibration", kept / "calibration.toml", "-o", tmp_path / "e.csv")
@@ -490,6 +503,7 @@ def test_a_calibration_of_another_car_and_options_that_contradict_it(kept, tmp_p
     assert "lies outside the log" in error_line(run(*start, "--span", "100:200"))
 
 
+@pytest.mark.studies
 def test_a_log_that_check_finds_wrong_is_refused_unless_one_goes_on_anyway(kept, tmp_path):
     table = with_steer()
     table["a_y"] = -table["a_y"]

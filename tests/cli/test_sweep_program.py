@@ -73,6 +73,7 @@ def test_a_study_is_swept_and_told(swept):
     assert "[vary]" in found.note
 
 
+@pytest.mark.studies
 def test_a_store_that_is_whole_is_not_computed_again(swept, monkeypatch):
     folder, result = swept
     from jaxveh.sweeps.chunks import Computing
@@ -83,6 +84,7 @@ def test_a_store_that_is_whole_is_not_computed_again(swept, monkeypatch):
     assert again.stdout == result.stdout.partition("figure:")[0]
 
 
+@pytest.mark.studies
 def test_it_is_shown_again_and_xarray_knows_the_units(swept):
     import xarray
 
@@ -121,6 +123,7 @@ def test_sweeps_of_other_makers_are_shown_too(tmp_path):
     assert result.exit_code == 0 and "error" in result.stdout
 
 
+@pytest.mark.studies
 def test_another_study_in_the_same_store_is_refused(swept, tmp_path):
     folder, _ = swept
     other = tmp_path / "other.toml"

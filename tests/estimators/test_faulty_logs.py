@@ -35,8 +35,12 @@ REPAIRED = ("spike", "stuck", "jump", "gap")
 
 @functools.cache
 def sound():
-    log = drive_of(CAR)
-    return log, estimators.sideslip.calibrate(CAR, log.without("v_y"))
+    return drive_of(CAR)
+
+
+@functools.cache
+def calibrated():
+    return estimators.sideslip.calibrate(CAR, sound().without("v_y"))
 
 
 def error(calibration, log):
@@ -50,7 +54,7 @@ def test_every_fault_has_its_words():
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_check_names_it_and_says_nothing_of_the_sound_log(name):
-    log, _ = sound()
+    log = sound()
     severity, channels, words = NAMED[name]
     found = lambda log: [
         one for one in diagnostics.check_log(log.without("v_y"), car=CAR)
@@ -61,14 +65,14 @@ def test_check_names_it_and_says_nothing_of_the_sound_log(name):
 
 @pytest.mark.parametrize("name", REPAIRED)
 def test_the_estimate_hardly_suffers(name):
-    log, calibration = sound()
+    log, calibration = sound(), calibrated()
     # The sound log is the linear car's own, and its error next to nothing: a tenth of a degree is what a hole may cost.
     assert error(calibration, FAULTS[name](log)) < 1.2 * error(calibration, log) + 0.1
 
 
 @pytest.mark.full
 def test_a_calibration_hardly_suffers_from_spikes_and_a_late_accelerometer_is_shifted():
-    log, calibration = sound()
+    log, calibration = sound(), calibrated()
     clean = error(calibration, log)
     spiky = FAULTS["spike"](log)
     assert error(estimators.sideslip.calibrate(CAR, spiky.without("v_y")), spiky) < 1.2 * clean + 0.02
@@ -83,7 +87,7 @@ def test_a_calibration_hardly_suffers_from_spikes_and_a_late_accelerometer_is_sh
 
 
 def test_shifting_takes_samples_as_they_are():
-    log, _ = sound()
+    log = sound()
     a_y = np.asarray(log["a_y"]).copy()
     a_y[500:520] = np.nan
     late = lambda **named: dataclasses.replace(estimators.sideslip.model(CAR).system, **named)
@@ -99,7 +103,7 @@ def test_shifting_takes_samples_as_they_are():
 
 
 def test_a_low_pass_of_the_cars_file_is_made_up_for():
-    log, _ = sound()
+    log = sound()
     slow = sensors.low_pass(log, ("a_x", "a_y", "yaw_rate"), 0.5)
     told = dataclasses.replace(CAR, low_pass=0.5)
     silent, knowing = (estimators.sideslip.estimate(car, slow.without("v_y")) for car in (CAR, told))
@@ -109,7 +113,7 @@ def test_a_low_pass_of_the_cars_file_is_made_up_for():
 
 
 def test_wild_and_stuck_values_are_missing_and_others_are_not():
-    log, _ = sound()
+    log = sound()
     kept = without_wild_values(log, CAR.wheelbase)
     for name in ("a_y", "yaw_rate"):
         np.testing.assert_array_equal(kept[name], log[name])
@@ -122,7 +126,7 @@ def test_wild_and_stuck_values_are_missing_and_others_are_not():
 
 
 def test_a_car_that_stands_tells_its_offsets(monkeypatch):
-    log, _ = sound()
+    log = sound()
     still = np.arange(len(log)) < 300
     rng = np.random.default_rng(0)
     said = lambda name, value, noise: value + np.where(still, noise * rng.normal(size=len(log)), np.asarray(log[name]))
