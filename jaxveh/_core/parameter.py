@@ -70,6 +70,46 @@ def check_parameters(module: eqx.Module) -> None:
             check_finite(name, value)
 
 
+def strong(tree):
+    """Return the tree with its declared parameters as their classes make them: strong float arrays, of the dtype of the others.
+
+    `eqx.tree_at` puts in what it is given, without asking the class. A plain number would be a part of the program, and a weakly
+    typed array another type: each would compile anew.
+    """
+    paths, treedef = jtu.tree_flatten_with_path(tree)
+    loose = [i for i, (path, leaf) in enumerate(paths) if _is_loose(leaf) and "domain" in _declaration(tree, path)]
+    if not loose:
+        return tree
+    leaves = [leaf for _, leaf in paths]
+    others = {leaf.dtype for leaf in leaves if eqx.is_inexact_array(leaf) and not _is_loose(leaf)}
+    dtype = max(others, key=lambda other: other.itemsize, default=jax.dtypes.canonicalize_dtype(float))
+    for i in loose:
+        leaves[i] = jnp.asarray(leaves[i], dtype)
+    return jtu.tree_unflatten(treedef, leaves)
+
+
+def _is_loose(leaf) -> bool:
+    """Whether a leaf is a number that would be a part of a program, or that may change its dtype."""
+    if isinstance(leaf, jax.Array):
+        return leaf.weak_type and not jnp.issubdtype(leaf.dtype, jnp.bool_)
+    return eqx.is_array_like(leaf) and not isinstance(leaf, bool)
+
+
+def _declaration(tree, path) -> Any:
+    """Return the metadata of the field that has the leaf."""
+    owner, metadata = tree, {}
+    for key in path:
+        by_name = isinstance(key, jtu.GetAttrKey)
+        metadata = _metadata(owner, key.name, metadata) if by_name else metadata
+        owner = _within(owner, key)
+    return metadata
+
+
+def _within(owner: Any, key: Any) -> Any:
+    by_name = isinstance(key, jtu.GetAttrKey)
+    return getattr(owner, key.name) if by_name else owner[getattr(key, "key", getattr(key, "idx", None))]
+
+
 class Parameter(NamedTuple):
     """One chosen parameter: its path in the tree, its name (`front.B`), its state field (`front_B`), unit and domain."""
 
@@ -167,7 +207,7 @@ def _describe(model, path) -> Parameter:
         metadata = _metadata(owner, key.name, metadata) if by_name else metadata
         if not _only_holds(owner, metadata):
             in_name.append(key)
-        owner = getattr(owner, key.name) if by_name else owner[getattr(key, "key", getattr(key, "idx", None))]
+        owner = _within(owner, key)
     name = _path_name(in_name or path)
     return Parameter(
         path=_path_name(path),

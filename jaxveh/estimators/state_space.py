@@ -13,7 +13,7 @@ from jaxveh import numerics
 from jaxveh._core.bijectors import AbstractBijector
 from jaxveh._core.errors import InputError, check_at_least
 from jaxveh._core.names import check_names, record, record_type
-from jaxveh._core.parameter import Where
+from jaxveh._core.parameter import Where, strong
 from jaxveh.sensors import Instrumented, SensorSet
 from jaxveh.statespace import (
     RK4,
@@ -84,7 +84,7 @@ def state_space(
     check_at_least("steps", steps, 1)
     check_at_least("minimum_speed", minimum_speed, 0)
     _check_kinds(car, sensors, estimate)
-    system = Instrumented(car, _without_noise(sensors))
+    system = Instrumented(strong(car), _without_noise(sensors))
     states = system.state_type._fields
     transition = Propagate(_derivatives, solver or RK4(), steps)
     model = StateSpace(

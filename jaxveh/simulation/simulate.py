@@ -12,6 +12,7 @@ import numpy as np
 
 from jaxveh._core.errors import FilterError, InputError, JaxvehWarning, check_key, check_one_of, is_concrete
 from jaxveh._core.names import as_mapping
+from jaxveh._core.parameter import strong
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import TRUTH, Recording
 from jaxveh._core.result import Result
@@ -131,7 +132,7 @@ def _describe(what: Any) -> str:
 
 def driven_car(car: AbstractVehicle, manoeuvre: Any, sensors: SensorSet | None = None, road: Any = None) -> Driven:
     """The car on its road with sensors and driver, as `simulate` integrates it. Raises `InputError` if they do not fit."""
-    placed = _place_on_road(car, road)
+    placed = _place_on_road(strong(car), road)
     driven = Driven(Instrumented(placed, sensors), with_pedals(manoeuvre, placed))
     check_inputs(driven)
     return driven

@@ -18,6 +18,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import FilterError, JaxvehWarning, check_one_of, is_concrete
 from jaxveh._core.estimated import Estimated
 from jaxveh._core.fresh_functions import note_function
+from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result, first_failure
 from jaxveh.statespace.belief import Info
@@ -95,6 +96,7 @@ def run(
     reason if the filter failed, and **warns** (`JaxvehWarning`) if it went on but has remarks on rows (`info.remark`),
     unless `throw=False`.
     """
+    model = strong(model)
     check_told(filter, model)
     filter.check(model)
     note_function("run: transition", model.transition_function)
