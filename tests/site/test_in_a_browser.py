@@ -115,6 +115,8 @@ def test_search_finds_a_filter(site, browser):
 def test_equations_are_drawn(site, browser):
     set_width(browser, WIDE)
     browser.get((site / "explanations" / "cars.html").as_uri())
+    # A busy machine has not read the page to its end when `get` returns.
+    wait_for(browser, "return document.readyState == 'complete' && document.querySelectorAll('math').length > 1")
     sizes = browser.execute_script(
         "return [...document.querySelectorAll('math')].map(m => m.getBoundingClientRect()).map(r => [r.width, r.height])"
     )
