@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -97,17 +97,17 @@ def _is_loose(leaf) -> bool:
 
 def _declaration(tree, path) -> Any:
     """Return the metadata of the field that has the leaf."""
+    return ({}, *(metadata for _, _, metadata in _owners(tree, path)))[-1]
+
+
+def _owners(tree, path) -> Iterator[tuple[Any, Any, Any]]:
+    """Each key of a leaf's path, with what it is a key of, and the metadata of the field's declaration."""
     owner, metadata = tree, {}
     for key in path:
         by_name = isinstance(key, jtu.GetAttrKey)
         metadata = _metadata(owner, key.name, metadata) if by_name else metadata
-        owner = _within(owner, key)
-    return metadata
-
-
-def _within(owner: Any, key: Any) -> Any:
-    by_name = isinstance(key, jtu.GetAttrKey)
-    return getattr(owner, key.name) if by_name else owner[getattr(key, "key", getattr(key, "idx", None))]
+        yield key, owner, metadata
+        owner = getattr(owner, key.name) if by_name else owner[getattr(key, "key", getattr(key, "idx", None))]
 
 
 class Parameter(NamedTuple):
@@ -199,15 +199,11 @@ def _only_holds(owner: Any, metadata: Any) -> bool:
 
 def _describe(model, path) -> Parameter:
     """Walk down to the module that owns the leaf and read its field's metadata."""
-    owner: Any = model
     metadata: Any = {}
     in_name = []
-    for key in path:
-        by_name = isinstance(key, jtu.GetAttrKey)
-        metadata = _metadata(owner, key.name, metadata) if by_name else metadata
+    for key, owner, metadata in _owners(model, path):
         if not _only_holds(owner, metadata):
             in_name.append(key)
-        owner = _within(owner, key)
     name = _path_name(in_name or path)
     return Parameter(
         path=_path_name(path),

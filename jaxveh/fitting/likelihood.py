@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jax import lax
 
-from jaxveh._core.parameter import Parameter, Where, pick
+from jaxveh._core.parameter import Parameter, Where, pick, strong
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, Gradient, scan
 from jaxveh.fitting.filter_problem import AbstractFilterProblem
@@ -94,6 +94,7 @@ def pose_likelihood(
 ) -> LikelihoodProblem:
     """The problem of `maximum_likelihood`, for `solve`; arguments and errors as there."""
     kit.check_gradients("maximum_likelihood", filter, Gradient.on_average)
+    model = strong(model)
     filter.check(model)
     rows = tuple(model.rows(recording) for recording in as_list(recordings))
     chosen = scalar_parameters(model, where)

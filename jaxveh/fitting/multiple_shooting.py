@@ -13,7 +13,7 @@ import optimistix as optx
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive, is_concrete
-from jaxveh._core.parameter import Parameter, Where, pick, put
+from jaxveh._core.parameter import Parameter, Where, pick, put, strong
 from jaxveh._core.recording import Recording
 from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, scalar_parameters
 from jaxveh.fitting.recorded import spread_on_line
@@ -107,6 +107,7 @@ def pose_shooting(
 ) -> ShootingProblem:
     """The problem of `multiple_shooting` over segments (see `cut`, `cut_rows`), for `solve`; arguments and errors as there."""
     check_positive("tie", tie)
+    model = strong(model)
     if model.chosen is None and where is None:
         raise InputError("multiple_shooting: the model estimates no parameter; give `where=`, or `with_parameters`.")
     if model.chosen is not None and where is not None:

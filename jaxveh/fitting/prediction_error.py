@@ -12,7 +12,7 @@ import numpy as np
 import optimistix as optx
 
 from jaxveh._core.errors import InputError, check_positive, is_concrete
-from jaxveh._core.parameter import Parameter, Where, pick
+from jaxveh._core.parameter import Parameter, Where, pick, strong
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, scan
@@ -187,6 +187,7 @@ def pose_prediction_error(
     if (mixture := kit.who_lacks(filter, "whitens")) is not None:
         raise InputError(f"prediction_error: {mixture} has no whitened innovations; use maximum_likelihood with it.")
     kit.check_gradients("prediction_error", filter, Gradient.exact)
+    model, centre = strong(model), strong(centre)
     filter.check(model)
     chosen = scalar_parameters(model, where)
     rows = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[model.rows(recording) for recording in recordings])

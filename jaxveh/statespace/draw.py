@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxveh._core.errors import check_key
 from jaxveh._core.names import record
+from jaxveh._core.parameter import strong
 from jaxveh._core.recording import TRUTH, Recording
 from jaxveh.statespace.dependent_noise import StateDependent
 from jaxveh.statespace.model import Row, StateSpace
@@ -34,6 +35,7 @@ def draw(model: StateSpace, schedule: Recording, key) -> Drawn:
     Angles are drawn unwrapped. **Raises** `InputError` for a schedule without the model's inputs.
     """
     check_key("draw", key)
+    model = strong(model)
     states, rows = _drawn(model, schedule_rows(model, schedule), key)
     shown = _report(model, rows, states)
     truth = {f"{TRUTH}{name}": values for name, values in shown._asdict().items()}

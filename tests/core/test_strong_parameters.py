@@ -1,6 +1,7 @@
 """A number that `eqx.tree_at` puts into a car or a model compiles nothing anew, and keeps the car's dtype."""
 
-import dataclasses
+import functools
+import inspect
 
 import equinox as eqx
 import jax
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 import jaxveh
-from jaxveh import estimators, filters, manoeuvres, sensors, statespace, tyres, vehicles
+from jaxveh import estimators, filters, fitting, manoeuvres, sensors, statespace, tyres, vehicles
 from jaxveh._core.parameter import strong
 
 KINDS = {
@@ -55,43 +56,134 @@ def test_what_a_class_does_not_declare_is_left_alone():
     assert type(found.chosen) is float and isinstance(found.brush.friction, jax.Array)
 
 
-TRACED = []
+DEVICE, STEER = sensors.esc(), manoeuvres.step_steer(25.0, 0.02, duration=1.3)
+NOISE = {"v_y": 0.02, "yaw_rate": 0.01}
 
 
-class Counted(vehicles.SingleTrack):
-    """A single track that notes when its equations are traced."""
-
-    def evaluate(self, *arguments):
-        TRACED.append(1)
-        return super().evaluate(*arguments)
+def simulated(car):
+    return jaxveh.simulate(car, STEER, DEVICE, dt=0.1)
 
 
-def test_drives_and_filters_are_compiled_once_for_all_of_them():
-    device, steer, plain = sensors.esc(), manoeuvres.step_steer(25.0, 0.02, duration=1.3), vehicles.passenger_car()
-    car = Counted(**{field.name: getattr(plain, field.name) for field in dataclasses.fields(plain) if field.init})
+@functools.cache
+def drive():
+    return simulated(vehicles.passenger_car())
 
-    def likelihoods(number):
-        drive = jaxveh.simulate(changed(car, number(1500.0)), steer, device, dt=0.1)
-        model = estimators.state_space(changed(car, number(1500.0)), device)
-        assert isinstance(model.system.vehicle.mass, jax.Array) and not model.system.vehicle.mass.weak_type
-        heavier = eqx.tree_at(lambda model: model.system.vehicle.mass, model, number(1600.0))
-        return [jaxveh.run(filters.Extended(), one, drive).log_likelihood for one in (model, heavier)]
 
-    def traced(number):
-        TRACED.clear()
-        return likelihoods(number), len(TRACED)
+KALMAN, KEY = filters.Extended(), jax.random.key(0)
+GRIP = lambda model: model.system.vehicle.front.D
+SHORT = dict(max_steps=2, standard_errors=False, throw=False)
 
-    # Names of outputs are asked of the equations each time a state space is made; more is asked by the first programs alone.
-    exact = lambda value: jnp.asarray(value, jnp.float64)
-    (expected, first), (_, again) = traced(exact), traced(exact)
-    assert expected[0] != expected[1] and first > again + 3
+PROGRAMS = {
+    "draw": lambda model: statespace.draw(model, drive(), KEY),
+    "log_likelihood_spread": lambda model: filters.log_likelihood_spread(
+        filters.ParticleFilter(20), model, drive(), KEY, 3
+    ),
+    "maximum_likelihood": lambda model: fitting.maximum_likelihood(KALMAN, model, drive(), GRIP, prior=0.1, **SHORT),
+    "monte_carlo": lambda model: filters.monte_carlo(KALMAN, model, drive(), KEY, 3),
+    "multiple_shooting": lambda model: fitting.multiple_shooting(model, drive(), GRIP, prior=0.1, **SHORT),
+    "posterior_cramer_rao": lambda model: statespace.posterior_cramer_rao(model, drive(), KEY, 3),
+    "prediction_error": lambda model: fitting.prediction_error(
+        KALMAN, model, drive(), GRIP, prior=0.1, max_steps=2, throw=False
+    ),
+    "run": lambda model: jaxveh.run(KALMAN, model, drive()),
+    "run_and_keep": lambda model: filters.run_and_keep(KALMAN, model, drive(), covariance),
+    "simulation_based_calibration": lambda model: filters.simulation_based_calibration(
+        KALMAN, model, drive(), KEY, 3, 9
+    ),
+    "smooth": lambda model: filters.smooth(KALMAN, model, drive()),
+    "smooth_parallel": lambda model: filters.smooth_parallel(filters.Iterated(KALMAN, 1), model, drive()),
+}
+"""What compiles a model, by name."""
+
+MAKES_A_MODEL = "makes a model, which a program takes"
+IN_A_PROGRAM = "is called within a program, or compiles nothing"
+NONE = {
+    "cut": IN_A_PROGRAM,
+    "export_filter": "the model's numbers are constants of its programs",
+    "held_rows": IN_A_PROGRAM,
+    "observe": "compiles a new function at each call",
+    "parameters_of": IN_A_PROGRAM,
+    "pose_likelihood": "poses what maximum_likelihood solves",
+    "pose_prediction_error": "poses what prediction_error solves",
+    "pose_shooting": "poses what multiple_shooting solves",
+    "predict_measurements": IN_A_PROGRAM,
+    "put_parameters": IN_A_PROGRAM,
+    "scan": "the compiled part of run",
+    "start_from": MAKES_A_MODEL,
+    "uncertain_inputs": MAKES_A_MODEL,
+    "with_disturbances": MAKES_A_MODEL,
+    "with_parameters": MAKES_A_MODEL,
+}
+
+
+def covariance(belief):
+    return belief.covariance
+
+
+def takes_a_model(function):
+    if not inspect.isfunction(inspect.unwrap(function)):
+        return False
+    given = inspect.signature(function).parameters.get("model")
+    return given is not None and "StateSpace" in str(given.annotation)
+
+
+def test_every_function_of_a_model_is_here():
+    rooms = (estimators, filters, fitting, statespace)
+    found = {name for room in rooms for name in room.__all__ if takes_a_model(getattr(room, name))}
+    assert found == {*PROGRAMS, *NONE}
+
+
+COMPILED: list = []
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _listen():
+    # The listener stays for the process: jax has no public way to take one away alone.
+    jax.monitoring.register_event_duration_secs_listener(
+        lambda event, _, **about: (
+            COMPILED.append(about.get("fun_name")) if event.endswith("backend_compile_duration") else None
+        )
+    )
+
+
+def compiled(call, tree):
+    """The names of the programs that a call compiles."""
+    strong(tree)  # the conversion of a number is a program, too
+    COMPILED.clear()
+    call(tree)
+    return list(COMPILED)
+
+
+def check_compiled_once(call, tree_of):
+    first, again = (compiled(call, tree_of(jnp.asarray(value, jnp.float64))) for value in (1500.0, 1510.0))
+    assert first and not again
+    for k, number in enumerate(KINDS.values()):
+        assert not compiled(call, tree_of(number(1520.0 + k)))
+
+
+@pytest.mark.product
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_program_of_a_model_is_compiled_once_for_all_of_them(name):
+    car = vehicles.passenger_car()
+    model = estimators.state_space(car, DEVICE, process_noise=NOISE)
+    drive()
+    jax.clear_caches()
+    mass = lambda model: model.system.vehicle.mass
+    check_compiled_once(PROGRAMS[name], lambda number: eqx.tree_at(mass, model, number))
+
+
+def test_a_drive_and_the_model_of_a_car_are_compiled_once_for_all_of_them():
+    car = vehicles.passenger_car()
+    jax.clear_caches()
+    check_compiled_once(simulated, lambda number: changed(car, number))
     for number in KINDS.values():
-        assert traced(number) == (expected, again)
+        mass = estimators.state_space(changed(car, number(1520.0)), DEVICE).system.vehicle.mass
+        assert isinstance(mass, jax.Array) and not mass.weak_type
 
 
 def test_its_gradient_is_that_of_the_strong_one():
-    device, steer, car = sensors.esc(), manoeuvres.step_steer(25.0, 0.02, duration=1.3), vehicles.passenger_car()
-    last = lambda mass: jaxveh.simulate(changed(car, mass), steer, device, dt=0.1, throw=False)["true.yaw_rate"][-1]
+    car = vehicles.passenger_car()
+    last = lambda mass: jaxveh.simulate(changed(car, mass), STEER, DEVICE, dt=0.1, throw=False)["true.yaw_rate"][-1]
     weak, exact = (jax.grad(last)(mass) for mass in (1500.0, jnp.asarray(1500.0, jnp.float64)))
     np.testing.assert_allclose(weak, exact, rtol=1e-12)
     assert abs(float(weak)) > 1e-7

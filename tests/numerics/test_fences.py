@@ -132,6 +132,18 @@ def test_blocks_fenced_are_what_fits_the_cache_alone(barriers, monkeypatch):
 
 
 @pytest.mark.parametrize("barriers", [True, False])
+@pytest.mark.parametrize("scale", [1.0, np.full(31, 0.7), np.full(4097, 0.7)], ids=np.size)
+def test_what_is_differentiated_is_fenced_however_short_it_is(barriers, scale, monkeypatch):
+    """Values, tangents and cotangents: a derivative has several times as many operations as its formula."""
+    monkeypatch.setattr(fences, "barriers_hold", lambda: barriers)
+    law = lambda x: jnp.sum(jnp.prod(jnp.stack(numerics.fence_blocks((jnp.sin(x * scale), x * scale))), axis=0))
+    x, ways = jnp.asarray(0.3), (jax.grad, jax.jacfwd, jax.hessian, lambda f: lambda x: jax.linearize(f, x)[1](x))
+    fits = np.size(scale) <= 4096
+    assert [holds(way(law), x, barriers) for way in ways] == [fits] * 4
+    assert holds(law, x, barriers) == (fits and barriers)
+
+
+@pytest.mark.parametrize("barriers", [True, False])
 @pytest.mark.parametrize("hold", [numerics.fence_blocks, firm])
 def test_what_is_fenced_is_decided_of_the_whole_batch(barriers, hold, monkeypatch):
     """A scalar that is one of forty is as long as an array of forty; and a branch stays one."""

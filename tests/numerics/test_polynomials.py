@@ -1,6 +1,7 @@
 """The stored coefficients are those of the recipe, and are as accurate as their precision asks."""
 
 import importlib.util
+import itertools
 from pathlib import Path
 from types import ModuleType
 
@@ -48,3 +49,16 @@ def test_evaluation_is_that_of_the_polynomial():
     for count in (1, 3, 4, 5):
         expected = np.polynomial.polynomial.polyval(t, coefficients[:count])
         np.testing.assert_allclose(polynomials.evaluate(coefficients[:count], t), expected, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("fused", list(itertools.product((False, True), repeat=3)))
+def test_the_sine_of_a_quarter_turn_is_one_in_float32_fused_or_not(fused):
+    """As `elementary` evaluates it; products of float32 are exact in float64."""
+    of_pairs, of_halves, last = fused
+    wide = lambda value: np.float64(np.float32(value))
+    multiply = lambda a, b: wide(a * b)
+    add = lambda a, b, c, fused: wide(a * b + c) if fused else wide(multiply(a, b) + c)
+    c, r = [wide(one) for one in polynomials.SINE_32], wide(np.pi / 2)
+    t = multiply(r, r)
+    even, odd = (add(c[k + 2], multiply(t, t), c[k], of_pairs) for k in (0, 1))
+    assert add(multiply(r, t), add(odd, t, even, of_halves), r, last) == 1.0

@@ -41,11 +41,11 @@ def test_the_spectral_radius_is_that_of_the_eigenvalues(dtype):
     rng = np.random.default_rng(5)
     drawn = rng.normal(size=(40, 7, 7)) * 10.0 ** rng.uniform(-3, 4, size=(40, 7, 7))
     turning = np.kron(np.eye(2), [[-3.0, 400.0], [-400.0, -3.0]])
-    dying = np.triu(rng.normal(size=(5, 5)), 1)
-    for matrix in (*drawn, turning, dying, np.zeros((3, 3))):
-        expected = np.max(np.abs(np.linalg.eigvals(matrix)))
-        found = float(stiffness.spectral_radius(jnp.asarray(matrix, dtype)))
-        assert found == pytest.approx(expected, rel=0.02, abs=1e-5 * np.max(np.abs(matrix), initial=1.0))
+    found = lambda matrix: float(stiffness.spectral_radius(jnp.asarray(matrix, dtype)))
+    for matrix in (*drawn, turning):
+        assert found(matrix) == pytest.approx(np.max(np.abs(np.linalg.eigvals(matrix))), rel=0.02)
+    # All eigenvalues are zero.
+    assert found(np.zeros((3, 3))) < 1e-5 and found(np.triu(rng.normal(size=(5, 5)), 1)) < 1e-5
     assert np.isnan(stiffness.spectral_radius(jnp.full((2, 2), np.nan)))
 
 
@@ -55,7 +55,9 @@ def test_differences_are_the_jacobian(dtype, near):
     x = jnp.asarray([0.3, -1.2, 25.0], dtype)
     found = jax.jit(lambda x: stiffness.differences(rates, x))(x)
     assert found.dtype == dtype
-    np.testing.assert_allclose(found, jax.jacfwd(rates)(x), rtol=near, atol=300 * near)
+    expected = np.asarray(jax.jacfwd(rates)(x))
+    error = np.abs(found - expected) / np.max(np.abs(expected), axis=1, keepdims=True)
+    assert np.max(error) < near
 
 
 @pytest.mark.parametrize("fast", ["low-pass", "driver"])

@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 from families import left_out
 from four_wheel_cars import drive as driven
+from jax.flatten_util import ravel_pytree
 
-from jaxveh import InputError, manoeuvres, statespace, tyres, vehicles
+from jaxveh import InputError, manoeuvres, simulation, statespace, tyres, vehicles
 from jaxveh._core.bijectors import Positive
 from jaxveh._core.names import record
 from jaxveh.roads import LEVEL, Ground
@@ -484,3 +485,28 @@ def test_a_drive_turns_to_the_side_of_the_steer(name):
     assert drive["true.y"][-1] > 0.1
     assert drive["true.a_y"][-1] > 0.5
     assert 13.0 < drive["true.x"][-1] < 15.5
+
+
+NOT_DRIVEN = ("Commanded", "KinematicCrawl")
+"""They need the rate of the steering, which no manoeuvre gives: `simulate` refuses them."""
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_its_fastest_pole_is_the_largest_eigenvalue(name):
+    """At speed and crawling, away from every symmetry, in both precisions: it decides the steps of a simulation."""
+    manoeuvre = manoeuvres.step_steer(SPEED, 0.02, start=0.1, duration=1.0)
+    if name in NOT_DRIVEN:
+        with pytest.raises(InputError, match="needs steer_rate"):
+            simulation.driven_car(made(name), manoeuvre)
+        return
+    car, t = simulation.driven_car(made(name), manoeuvre), jnp.asarray(0.3)
+    pole, rng = jax.jit(simulation.fastest_pole), np.random.default_rng(2)
+    for speed in (SPEED, 1.0):
+        x = car.start(t, float, **({"v_x": speed} if "v_x" in made(name).state_type._fields else {}))
+        flat, shaped = ravel_pytree(x)
+        flat = flat * (1 + 0.01 * rng.normal(size=flat.size)) + 0.003 * rng.normal(size=flat.size)
+        jacobian = jax.jacfwd(lambda y, shaped=shaped: ravel_pytree(car.derivatives(t, shaped(y)))[0])(flat)
+        expected = np.max(np.abs(np.linalg.eigvals(np.asarray(jacobian))))
+        for dtype in (np.float64, np.float32):
+            low, at, now = (statespace.cast(some, dtype) for some in (car, shaped(flat), t))
+            assert float(pole(low, now, at)) == pytest.approx(expected, rel=0.02, abs=1e-3)

@@ -9,6 +9,7 @@ from typing import Any
 import equinox as eqx
 
 from jaxveh._core.fresh_functions import note_function
+from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
 from jaxveh.statespace import AbstractFilter, Estimate, StateSpace, kit
 
@@ -23,6 +24,7 @@ def run_and_keep(
     For example `lambda belief: belief.covariance`, or the belief's `ancestors`. Each new lambda compiles anew.
     **Raises** as `run`.
     """
+    model = strong(model)
     kit.check_told(filter, model)
     filter.check(model)
     note_function("run_and_keep: keep", keep)

@@ -10,6 +10,7 @@ import jax
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_key, check_positive, check_whole
+from jaxveh._core.parameter import strong
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.filters.calibration.batches import in_batches
@@ -72,6 +73,7 @@ def log_likelihood_spread(
     """
     check_whole("runs", runs, 2)
     check_key("log_likelihood_spread", key)
+    model = strong(model)
     filter.check(model)
     rows = model.rows(recording)
     found, results = in_batches(

@@ -9,6 +9,7 @@ import jax
 import numpy as np
 
 from jaxveh._core.errors import FilterError, check_key, check_whole
+from jaxveh._core.parameter import strong
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result
@@ -60,7 +61,7 @@ def monte_carlo(
     **Raises** `InputError` where filter, model, truth and schedule do not agree; `FilterError` where runs fail, unless
     `throw=False`.
     """
-    truth = model if truth is None else truth
+    model, truth = strong(model), strong(model if truth is None else truth)
     check_whole("runs", runs)
     check_key("monte_carlo", key)
     check_truth(model, truth)

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_key, check_whole
+from jaxveh._core.parameter import strong
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import chi_squared_tails
@@ -79,7 +80,7 @@ def simulation_based_calibration(
 
     **Arguments**: as `monte_carlo`. **Raises** likewise.
     """
-    truth = model if truth is None else truth
+    model, truth = strong(model), strong(model if truth is None else truth)
     check_whole("runs", runs)
     check_key("simulation_based_calibration", key)
     check_whole("draws", draws)

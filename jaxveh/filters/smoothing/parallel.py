@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
+from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import first_failure
 from jaxveh.filters.gaussian import AbstractGaussianFilter
@@ -41,6 +42,7 @@ def smooth_parallel(
         raise InputError(
             f"smooth_parallel: {type(filter).__name__}: must be Kalman() or Iterated(...), not wrapped, with Covariance()."
         )
+    model = strong(model)
     filter.check(model)
     if model.angles and filter.linearisations == 0:
         raise InputError(
