@@ -35,7 +35,7 @@ def cases(smoke: bool) -> list[Case]:
             name=f"compile_times/{kind}",
             title=f"{title}, float64",
             unit="s",
-            build=functools.partial(_build, kind, filter_),
+            build=functools.partial(_build, kind, filter_, smoke),
             base=OURS,
             warm=False,
         )
@@ -43,7 +43,7 @@ def cases(smoke: bool) -> list[Case]:
     ]
 
 
-def _build(kind: str, filter_: filters.AbstractFilter) -> Sequence[Contestant | Skipped]:
+def _build(kind: str, filter_: filters.AbstractFilter, smoke: bool) -> Sequence[Contestant | Skipped]:
     particle = kind != "ukf"
     problem = single_track(50) if particle else speed_and_mass(50)
     if particle:
@@ -60,36 +60,39 @@ def _build(kind: str, filter_: filters.AbstractFilter) -> Sequence[Contestant | 
         return jax.grad(lambda m: filters.scan(filter_, m, rows, key).log_likelihood)(model)
 
     made: list[Contestant | Skipped] = [
-        Contestant(OURS, _compiling(estimate, model, rows, key), 1),
-        Contestant(f"{OURS}, gradient", _compiling(gradient, model, rows, key), 1),
+        Contestant(OURS, _compiling(estimate, model, rows, key, smoke=smoke), 1),
+        Contestant(f"{OURS}, gradient", _compiling(gradient, model, rows, key, smoke=smoke), 1),
     ]
     names = ("smcx",) if particle else ("dynamax", "smcx")
     for name in names:
         try:
-            made.append(Contestant(name, _peer(name, kind, problem), 1))
+            made.append(Contestant(name, _peer(name, kind, problem, smoke), 1))
         except ImportError as error:
             made.append(Skipped(name, f"not installed here ({error.name})"))
     return made
 
 
-def _compiling(function: Callable, *arguments: object) -> Callable[[int], object]:
-    """Return a function that compiles again in each call: caches are cleared, so that tracing and lowering count as well."""
+def _compiling(function: Callable, *arguments: object, smoke: bool) -> Callable[[int], object]:
+    """Return a function that compiles again in each call: caches are cleared, so that tracing and lowering count as well.
+
+    In a `smoke` run it stops before XLA, which compiles the same filters in other experiments."""
 
     def call(index: int) -> object:
         jax.clear_caches()
-        return jax.jit(lambda *a: function(*a)).lower(*arguments).compile()
+        lowered = jax.jit(lambda *a: function(*a)).lower(*arguments)
+        return lowered if smoke else lowered.compile()
 
     return call
 
 
-def _peer(name: str, kind: str, problem: object) -> Callable[[int], object]:
+def _peer(name: str, kind: str, problem: object, smoke: bool) -> Callable[[int], object]:
     if kind == "ukf":
         if name == "dynamax":
             from .peers.dynamax_filters import unscented
         else:
             from .peers.smcx_filters import unscented
-        return _compiling(unscented(problem, np.float64), jnp.asarray(problem.speed[:, 0]))
+        return _compiling(unscented(problem, np.float64), jnp.asarray(problem.speed[:, 0]), smoke=smoke)
     from .peers.smcx_filters import particle_filter
 
     run = particle_filter(problem, 1000, auxiliary=kind == "apf", dtype=np.float64)
-    return _compiling(run, jax.random.key(0))
+    return _compiling(run, jax.random.key(0), smoke=smoke)

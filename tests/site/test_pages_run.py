@@ -43,9 +43,10 @@ def test_a_page_runs_from_top_to_bottom(place, tmp_path):
 
 
 OF_NAMED_TUPLES = ("_asdict", "_fields", "_replace")
+"""Public for all that they begin with: Python's own names of a NamedTuple."""
+
 HOOKS = ("_labelled",)
 """What a class says of itself, for those who write one."""
-"""Public for all that they begin with: Python's own names of a NamedTuple."""
 
 
 @pytest.mark.parametrize("place", PYTHON)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from jaxveh.experiments.sideslip_review.chapters import chapter_figures
-from jaxveh.experiments.sideslip_review.contestants import WHAT
 from jaxveh.experiments.sideslip_review.recorded import BEST, READY, Logged
 from jaxveh.experiments.sideslip_review.report import Reproduction
 from jaxveh.experiments.sideslip_review.study import EVERY, Raced
@@ -59,11 +58,11 @@ def marks_figure(raced: Raced) -> Any:
 
 
 def errors_figure(raced: Raced) -> Any:
-    """Sideslip RMSE of every method by scenario: medians and quartiles over seeds."""
+    """Sideslip RMSE of the methods by scenario: medians and quartiles over seeds."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 4.6), layout="constrained")
     with style():
         panels = figure.subplots(2, 4, sharey=True, sharex=True).ravel()
-        names = list(WHAT)
+        names = list(raced.found)
         for axes, scenario in zip(panels, (*raced.scenarios, "long"), strict=False):
             metric, where = ("late", "normal") if scenario == "long" else ("early", scenario)
             metric = "late" if scenario == "friction" else metric
