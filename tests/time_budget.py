@@ -5,13 +5,15 @@ longer than `BUDGET`. Beyond it a function's time grows with the square root of 
 runs, the others are left to `-m full`. Each function starts at a case of its own, which its name decides: most members of a
 class (every filter, every method) meet some test, and a file alone runs the cases that it runs among all. Cases that take
 longer than `LONGEST` are `thorough`, the quickest functions of a file first, for `LONG_BUDGET` seconds a file; the others are
-left to `-m full` too. A function that is not on record runs whole, so that a new one is never left out.
+left to `-m full` too. A case that alone takes much longer than its function's others is on record by its own name: it is long,
+the others are not. A function that is not on record runs whole, so that a new one is never left out.
 
 `JAXVEH_SECONDS=1 python -m pytest` records them again.
 """
 
 import json
 import math
+import statistics
 import zlib
 from pathlib import Path
 
@@ -21,6 +23,9 @@ BUDGET, LONGEST, LONG_BUDGET = 0.5, 2.0, 3.0
 """Seconds a test function, a case, and a file's long cases, on a slow machine of two cores; a quick one takes 0.4 of them.
 
 What tests of a file share is taken by the first that runs: the record has the larger numbers of two selections."""
+
+OUTLIER = 3.0
+"""Times the median of its function's cases: a case that takes longer is on record by itself."""
 
 COLOURS = 6
 """Of the cases of a `product` one in so many runs by default."""
@@ -54,11 +59,15 @@ def keep_one_colour(items):
 
 def keep_to_budget(items):
     """Mark as `full` the cases beyond a function's budget, and as `thorough` what is left of those that take too long."""
-    seconds, cases = json.loads(RECORD.read_text()), {}
+    seconds, cases, long = json.loads(RECORD.read_text()), {}, {}
     for item in items:
-        if not any(item.get_closest_marker(mark) for mark in LEFT_OUT):
-            cases.setdefault(function_of(item.nodeid), []).append(item)
-    long: dict = {}
+        if any(item.get_closest_marker(mark) for mark in LEFT_OUT):
+            continue
+        name, own = function_of(item.nodeid), item.nodeid.removeprefix("tests/")
+        if own != name and own in seconds:
+            long.setdefault(name.partition("::")[0], []).append((seconds[own], own, [item]))
+        else:
+            cases.setdefault(name, []).append(item)
     for name, members in cases.items():
         each = seconds.get(name, 0.0)
         kept = spread_evenly(len(members), number_kept(each, len(members)), zlib.crc32(name.encode()))
@@ -92,15 +101,16 @@ def spread_evenly(many, few, first):
 
 
 def record_seconds(durations):
-    """Put the mean seconds of a case on record, of functions that take longer than their budget: `durations` are those of all
-    cases that ran, by node. What did not run keeps its number."""
-    found = {}
+    """Put the mean seconds of a case on record, of functions that take longer than their budget, and cases that are much longer
+    than the others by themselves: `durations` are those of all cases that ran, by node. What did not run keeps its number."""
+    found, seconds = {}, {}
     for nodeid, took in durations.items():
-        found.setdefault(function_of(nodeid), []).append(took)
-    seconds = (
-        {name: took for name, took in json.loads(RECORD.read_text()).items() if name not in found}
-        if RECORD.exists()
-        else {}
-    )
-    seconds |= {name: round(sum(took) / len(took), 2) for name, took in found.items() if sum(took) > BUDGET}
+        found.setdefault(function_of(nodeid), {})[nodeid.removeprefix("tests/")] = took
+    for name, took in found.items():
+        alone = {case: t for case, t in took.items() if t > max(LONGEST, OUTLIER * statistics.median(took.values()))}
+        others = [t for case, t in took.items() if case not in alone]
+        seconds |= alone | ({name: sum(others) / len(others)} if sum(others) > BUDGET else {})
+    kept = json.loads(RECORD.read_text()) if RECORD.exists() else {}
+    kept = {name: took for name, took in kept.items() if name not in found and f"tests/{name}" not in durations}
+    seconds = kept | {name: round(took, 2) for name, took in seconds.items()}
     RECORD.write_text(json.dumps(dict(sorted(seconds.items())), indent=0) + "\n")

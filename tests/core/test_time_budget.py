@@ -93,10 +93,26 @@ def test_what_did_not_run_keeps_its_seconds(tmp_path, monkeypatch):
     assert json.loads(time_budget.RECORD.read_text()) == {"b.py::slow": 5.0}
 
 
+def test_a_case_that_takes_long_alone_is_on_record_alone(tmp_path, monkeypatch):
+    """Its function's others run as if it were not there."""
+    monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
+    record_seconds({f"tests/a.py::f[{k}]": 0.01 for k in range(9)} | {"tests/a.py::f[slow]": LONG_BUDGET})
+    record_seconds({f"tests/a.py::g[{k}]": 0.2 for k in range(9)} | {"tests/a.py::g[slow]": 2 * LONG_BUDGET})
+    on_record = {"a.py::f[slow]": LONG_BUDGET, "a.py::g": 0.2, "a.py::g[slow]": 2 * LONG_BUDGET}
+    assert json.loads(time_budget.RECORD.read_text()) == on_record
+    items = {name: Item(f"tests/a.py::{name}") for name in ("f[1]", "f[2]", "f[slow]", "g[1]", "g[slow]")}
+    time_budget.keep_to_budget(list(items.values()))
+    assert {name: item.marks for name, item in items.items()} == {
+        "f[1]": [], "f[2]": [], "f[slow]": ["thorough"], "g[1]": [], "g[slow]": ["full"]
+    }  # fmt: skip
+    record_seconds({"tests/a.py::f[slow]": 0.1})
+    assert "a.py::f[slow]" not in json.loads(time_budget.RECORD.read_text())
+
+
 def test_every_function_on_record_is_a_test_that_there_is():
     """A test that was renamed would run whole."""
     tests = time_budget.RECORD.parents[1]
     for name in json.loads(time_budget.RECORD.read_text()):
-        file, _, function = name.partition("::")
+        file, _, function = function_of(name).partition("::")
         assert f"def {function.rpartition('::')[2]}(" in (tests / file).read_text("utf-8"), name
     assert function_of("tests/a.py::slow[a[b]]") == "a.py::slow"
