@@ -23,8 +23,8 @@ def python_of(place):
 
 
 def when(k, place):
-    """Starts, and of the other pages one in six, are run for each change; the rest by `-m full`."""
-    marks = pytest.mark.studies if k % 6 == 0 or place.startswith(("README", "index", "start/")) else pytest.mark.full
+    """Starts, and of the other pages one in twelve, are run for each change; the rest by `-m full`."""
+    marks = pytest.mark.studies if k % 12 == 0 or place.startswith(("README", "index", "start/")) else pytest.mark.full
     return pytest.param(place, marks=marks)
 
 
