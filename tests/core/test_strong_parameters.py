@@ -114,6 +114,7 @@ NONE = {
     "with_disturbances": MAKES_A_MODEL,
     "with_parameters": MAKES_A_MODEL,
 }
+"""The other functions of a model, each with the reason why it is no program here."""
 
 
 def covariance(belief):

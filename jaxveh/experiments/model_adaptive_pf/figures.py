@@ -79,7 +79,9 @@ def sideslip_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any
         truth = np.rad2deg(drive.true_sideslip)
         above.plot(t, truth, color=COLOURS["truth"], label="truth", zorder=3)
         there = raced.found.design.axis("estimator").labels
-        for name, colour in ((name, colour) for name, colour in SHOWN.items() if name in there):
+        for name, colour in SHOWN.items():
+            if name not in there:
+                continue
             found = np.rad2deg(raced.of("course", name, case)[seed])
             above.plot(t, found, color=colour, label=name)
             below.plot(t, found - truth, color=colour)
