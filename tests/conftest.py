@@ -66,6 +66,12 @@ def pytest_collection_modifyitems(items):
     keep_to_budget(items)
 
 
+def pytest_collection_finish():
+    """What has been imported and collected stays: looking through it for cycles takes seconds each time."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     """Tests that share compiled programs go to one worker: a file's, or a filter's where a file goes through all of them.

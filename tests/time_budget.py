@@ -43,14 +43,18 @@ def function_of(nodeid):
 
 def keep_one_colour(items):
     """Of a `product` one case in six stays, the others are left to `-m full`: each value of a parameter meets a sixth of the
-    others', and each test has a sixth of the cases, as the fields of one colour on a board of six. Of few cases none may have
-    the colour: then one of the next colour stays, so that every test has a case."""
+    others', and each test has a sixth of the cases, as the fields of one colour on a board of six. The test's name decides the
+    colour: whatever stands beside it, the same cases run. Of few cases none may have the colour: then one of the next colour
+    stays, so that every test has a case."""
     functions: dict = {}
     for item in items:
         if item.get_closest_marker("product") and hasattr(item, "callspec"):
-            functions.setdefault((item.path, item.originalname), []).append(item)
-    for start, members in enumerate(functions.values()):
-        colours = [(start + sum(item.callspec.indices.values())) % COLOURS for item in members]
+            functions.setdefault(function_of(item.nodeid), []).append(item)
+    for name, members in functions.items():
+        start = zlib.crc32(name.encode())
+        # Names that are given together, `("quantity", "name")`, count once.
+        places = set(zip(*(item.callspec.indices.values() for item in members), strict=True))
+        colours = [(start + sum(at)) % COLOURS for at in zip(*places, strict=True)]
         kept = [place for place, colour in enumerate(colours) if colour == 0] or [colours.index(min(colours))]
         for place, item in enumerate(members):
             if place not in kept:
@@ -95,22 +99,29 @@ def number_kept(each, most):
     return most if whole <= BUDGET else min(most, math.ceil(math.sqrt(BUDGET * whole) / each))
 
 
+def number_in_all(each, kept):
+    """At most how many cases a function has, of which `kept` ran when each took so many seconds: `number_kept` the other way."""
+    return max(kept, each * kept**2 / BUDGET)
+
+
 def spread_evenly(many, few, first):
     """The places of `few` of `many`, from the `first` on."""
     return {(first + (many * k) // few) % many for k in range(few)}
 
 
 def record_seconds(durations):
-    """Put the mean seconds of a case on record, of functions that take longer than their budget, and cases that are much longer
-    than the others by themselves: `durations` are those of all cases that ran, by node. What did not run keeps its number."""
+    """Put the mean seconds of a case on record, of functions that take longer than their budget with all their cases, and cases
+    that are much longer than the others by themselves: `durations` are those of all cases that ran, by node. What did not run
+    keeps its number."""
+    kept = json.loads(RECORD.read_text()) if RECORD.exists() else {}
     found, seconds = {}, {}
     for nodeid, took in durations.items():
         found.setdefault(function_of(nodeid), {})[nodeid.removeprefix("tests/")] = took
     for name, took in found.items():
         alone = {case: t for case, t in took.items() if t > max(LONGEST, OUTLIER * statistics.median(took.values()))}
         others = [t for case, t in took.items() if case not in alone]
-        seconds |= alone | ({name: sum(others) / len(others)} if sum(others) > BUDGET else {})
-    kept = json.loads(RECORD.read_text()) if RECORD.exists() else {}
+        whole = number_in_all(kept.get(name, 0.0), len(others)) * sum(others) / max(len(others), 1)
+        seconds |= alone | ({name: sum(others) / len(others)} if whole > BUDGET else {})
     kept = {name: took for name, took in kept.items() if name not in found and f"tests/{name}" not in durations}
     seconds = kept | {name: round(took, 2) for name, took in seconds.items()}
     RECORD.write_text(json.dumps(dict(sorted(seconds.items())), indent=0) + "\n")

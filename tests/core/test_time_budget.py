@@ -59,20 +59,39 @@ def test_a_file_alone_runs_the_cases_that_it_runs_among_all(tmp_path, monkeypatc
     assert not any(item.marks for item in files["a"][40:])
 
 
+def of_a_product(function, k, **indices):
+    item = Item(f"tests/a.py::f{function}[{k}]")
+    item.callspec = SimpleNamespace(indices=indices or {"x": k})
+    item.get_closest_marker = lambda name: name == "product"
+    return item
+
+
 @pytest.mark.parametrize("many", [1, 2, 5, 6, 7, 30])
 def test_every_test_of_a_product_has_a_case(many):
     """Whatever its number of cases, and whichever tests stand before it."""
     items = []
     for function in range(13):
         for k in range(many):
-            item = Item(f"tests/a.py::f{function}[{k}]")
-            item.path, item.originalname, item.callspec = "a.py", f"f{function}", SimpleNamespace(indices={"x": k})
-            item.get_closest_marker = lambda name: name == "product"
-            items.append(item)
+            items.append(of_a_product(function, k))
     time_budget.keep_one_colour(items)
     for function in range(13):
-        kept = [item for item in items if item.originalname == f"f{function}" and not item.marks]
+        members = items[many * function : many * (function + 1)]
+        kept = [k for k, item in enumerate(members) if not item.marks]
         assert 1 <= len(kept) <= -(-many // time_budget.COLOURS)
+        # Without the others the same cases run.
+        alone = [of_a_product(function, k) for k in range(many)]
+        time_budget.keep_one_colour(alone)
+        assert kept == [k for k, item in enumerate(alone) if not item.marks]
+
+
+@pytest.mark.parametrize("function", range(6))
+def test_each_value_of_a_product_meets_a_sixth_of_the_others(function):
+    items = [of_a_product(function, f"{i}-{j}", a=i, b=j, with_b=j) for i in range(12) for j in range(18)]
+    time_budget.keep_one_colour(items)
+    kept = [item.callspec.indices for item in items if not item.marks]
+    assert len(kept) == 36
+    assert [sum(one["a"] == i for one in kept) for i in range(12)] == [3] * 12
+    assert [sum(one["b"] == j for one in kept) for j in range(18)] == [2] * 18
 
 
 def test_of_a_files_long_cases_the_quickest_run():
@@ -84,12 +103,24 @@ def test_of_a_files_long_cases_the_quickest_run():
     assert marks == {"a": ["thorough"], "c": ["thorough"], "b": ["full"], "d": ["full"]}
 
 
+@pytest.mark.parametrize("each", [0.01, 0.06, 0.3, 2.0])
+def test_a_function_of_which_few_cases_ran_stays_on_record(each, tmp_path, monkeypatch):
+    """Those that ran take less than the budget: all of them, which would run without the record, do not."""
+    monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
+    for many in (1, 2, 9, 100):
+        kept = number_kept(each, many)
+        assert many <= time_budget.number_in_all(each, kept) or kept == many
+        time_budget.RECORD.write_text(json.dumps({"a.py::f": each}))
+        record_seconds({f"tests/a.py::f[{k}]": each for k in range(kept)})
+        assert ("a.py::f" in json.loads(time_budget.RECORD.read_text())) == (each * many > BUDGET)
+
+
 def test_what_did_not_run_keeps_its_seconds(tmp_path, monkeypatch):
     monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
     record_seconds({"tests/a.py::slow[1]": 2.0, "tests/a.py::slow[2]": 4.0, "tests/a.py::quick": 0.1})
     record_seconds({"tests/b.py::slow": 5.0})
     assert json.loads(time_budget.RECORD.read_text()) == {"a.py::slow": 3.0, "b.py::slow": 5.0}
-    record_seconds({"tests/a.py::slow[1]": 0.2})
+    record_seconds({"tests/a.py::slow[1]": 0.05})
     assert json.loads(time_budget.RECORD.read_text()) == {"b.py::slow": 5.0}
 
 

@@ -34,8 +34,8 @@ every = pytest.mark.parametrize(
     ("quantity", "name"), [case(quantity, name) for quantity, module in QUANTITIES.items() for name in module.METHODS]
 )
 
-third = pytest.mark.product
-"""Of sixty methods each test has a third by default, and each method a third of the tests; `-m full` has them all."""
+a_sixth = pytest.mark.product
+"""Of ninety methods each test has a sixth by default; `-m full` has them all."""
 
 
 def draws(method):
@@ -91,7 +91,7 @@ def test_what_it_lacks_is_named(quantity, name):
         module.estimate(method_logs.CAR, log, method="nothing")
 
 
-@third
+@a_sixth
 @every
 def test_an_answer_is_finite_or_not_known_whatever_the_log_lacks(quantity, name):
     module, method = QUANTITIES[quantity], made(quantity, name)
@@ -119,7 +119,7 @@ def test_an_answer_is_finite_or_not_known_whatever_the_log_lacks(quantity, name)
     assert known or "known only" in module.METHODS[name].help
 
 
-@third
+@a_sixth
 @every
 def test_live_says_what_it_says_of_a_log_and_is_compiled_once(quantity, name):
     module, method = QUANTITIES[quantity], made(quantity, name)
@@ -151,7 +151,7 @@ def test_live_says_what_it_says_of_a_log_and_is_compiled_once(quantity, name):
         np.testing.assert_array_equal([getattr(one.known, field) for one in answers], getattr(found.known, field))
 
 
-@third
+@a_sixth
 @every
 def test_float32_is_float32_throughout_and_near(quantity, name):
     method = made(quantity, name)
@@ -174,7 +174,7 @@ def test_float32_is_float32_throughout_and_near(quantity, name):
         assert near <= share * max(np.abs(there[known]).max(), 1e-2), field
 
 
-@third
+@a_sixth
 @every
 def test_gradients_with_respect_to_its_numbers_and_its_rows_are_finite_and_right(quantity, name):
     module, method = QUANTITIES[quantity], made(quantity, name)
@@ -182,13 +182,14 @@ def test_gradients_with_respect_to_its_numbers_and_its_rows_are_finite_and_right
     values = jax.tree.map(lambda leaf: leaf[0, :120], values)
     numbers, rest = eqx.partition(method, eqx.is_inexact_array)
 
-    @jax.jit
     def total(numbers, values):
         said = kit.follow_rows(eqx.combine(numbers, rest), time[:120], values)
         shown = [getattr(said.mean, field) for field in module.SHOWN]
         return sum(jnp.mean(jnp.where(jnp.isfinite(one), one, 0.0) * jnp.cos(time[:120])) for one in shown)
 
-    slopes = jax.jit(jax.grad(total, argnums=(0, 1)))(numbers, values)
+    # One program for the slopes and for the differences: compiling takes longer than the slopes that nobody asks for.
+    with_slopes = jax.jit(jax.value_and_grad(total, argnums=(0, 1)))
+    here, slopes = with_slopes(numbers, values)
     for slope in jax.tree.leaves(slopes):
         assert np.isfinite(slope).all()
     leaves, structure = jax.tree.flatten(numbers)
@@ -200,10 +201,10 @@ def test_gradients_with_respect_to_its_numbers_and_its_rows_are_finite_and_right
         ahead, behind = (
             jax.tree.unflatten(structure, [*leaves[:k], leaf + d, *leaves[k + 1 :]]) for d in (step, -step)
         )
-        difference = (total(ahead, values) - total(behind, values)) / (2.0 * step)
+        difference = (with_slopes(ahead, values)[0] - with_slopes(behind, values)[0]) / (2.0 * step)
         found = jax.tree.leaves(slopes[0])[k]
         # A total of thousands (kg m^2) has no more digits in its difference than this.
-        rounding = 0.5 * np.finfo(float).eps * abs(float(total(numbers, values))) / step
+        rounding = 0.5 * np.finfo(float).eps * abs(float(here)) / step
         atol = 1e-4 * (abs(float(found)) + 1e-2) + rounding
         np.testing.assert_allclose(found, difference, rtol=2e-3, atol=atol, err_msg=str(k))
 

@@ -94,7 +94,7 @@ def test_in_parallel_over_time_an_angle_may_be_measured_turns_away():
 @pytest.mark.parametrize(("method", "most"), [(filters.BackwardSampling(1000), 0.1), (filters.Genealogy(), 0.4)])
 def test_particles_find_it_within_their_scatter(method, most):
     """On a recording that is a draw of the model, where particles are not all far out."""
-    model, recording = linear(), recordings("linear")[0]
+    model, recording = linear(), recordings("linear")[0].rows(slice(0, 15))
     exact = filters.smooth(filters.Kalman(), model, recording)
     found = filters.smooth(filters.ParticleFilter(4000), model, recording, key=jax.random.key(1), method=method)
     error = (np.stack(found.mean) - np.stack(exact.mean)) / np.stack(exact.std)

@@ -500,13 +500,14 @@ def test_its_fastest_pole_is_the_largest_eigenvalue(name):
             simulation.driven_car(made(name), manoeuvre)
         return
     car, t = simulation.driven_car(made(name), manoeuvre), jnp.asarray(0.3)
+    start = jax.jit(lambda speed: car.start(t, float, **({"v_x": speed} if "v_x" in made(name).state_type._fields else {})))
+    jacobian = jax.jit(jax.jacfwd(lambda y, shaped: ravel_pytree(car.derivatives(t, shaped(y)))[0]), static_argnums=1)
     pole, rng = jax.jit(simulation.fastest_pole), np.random.default_rng(2)
     for speed in (SPEED, 1.0):
-        x = car.start(t, float, **({"v_x": speed} if "v_x" in made(name).state_type._fields else {}))
+        x = start(speed)
         flat, shaped = ravel_pytree(x)
         flat = flat * (1 + 0.01 * rng.normal(size=flat.size)) + 0.003 * rng.normal(size=flat.size)
-        jacobian = jax.jacfwd(lambda y, shaped=shaped: ravel_pytree(car.derivatives(t, shaped(y)))[0])(flat)
-        expected = np.max(np.abs(np.linalg.eigvals(np.asarray(jacobian))))
+        expected = np.max(np.abs(np.linalg.eigvals(np.asarray(jacobian(flat, shaped)))))
         for dtype in (np.float64, np.float32):
             low, at, now = (statespace.cast(some, dtype) for some in (car, shaped(flat), t))
             # 1/s: a car without dynamics of its own has no pole, only rounding.
