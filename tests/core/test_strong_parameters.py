@@ -78,7 +78,9 @@ PROGRAMS = {
     "log_likelihood_spread": lambda model: filters.log_likelihood_spread(
         filters.ParticleFilter(20), model, drive(), KEY, 3
     ),
-    "maximum_likelihood": lambda model: fitting.maximum_likelihood(KALMAN, model, drive(), STIFFNESS, prior=0.1, **SHORT),
+    "maximum_likelihood": lambda model: fitting.maximum_likelihood(
+        KALMAN, model, drive(), STIFFNESS, prior=0.1, **SHORT
+    ),
     "monte_carlo": lambda model: filters.monte_carlo(KALMAN, model, drive(), KEY, 3),
     "multiple_shooting": lambda model: fitting.multiple_shooting(model, drive(), STIFFNESS, prior=0.1, **SHORT),
     "posterior_cramer_rao": lambda model: statespace.posterior_cramer_rao(model, drive(), KEY, 3),

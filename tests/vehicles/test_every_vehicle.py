@@ -500,7 +500,9 @@ def test_its_fastest_pole_is_the_largest_eigenvalue(name):
             simulation.driven_car(made(name), manoeuvre)
         return
     car, t = simulation.driven_car(made(name), manoeuvre), jnp.asarray(0.3)
-    start = jax.jit(lambda speed: car.start(t, float, **({"v_x": speed} if "v_x" in made(name).state_type._fields else {})))
+    start = jax.jit(
+        lambda speed: car.start(t, float, **({"v_x": speed} if "v_x" in made(name).state_type._fields else {}))
+    )
     jacobian = jax.jit(jax.jacfwd(lambda y, shaped: ravel_pytree(car.derivatives(t, shaped(y)))[0]), static_argnums=1)
     pole, rng = jax.jit(simulation.fastest_pole), np.random.default_rng(2)
     for speed in (SPEED, 1.0):
