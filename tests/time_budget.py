@@ -32,8 +32,9 @@ COLOURS = 6
 
 RECORD = Path(__file__).parent / "recorded" / "seconds.json"
 
-LEFT_OUT = ("full", "peers", "studies", "site")
-"""Marks of tests that do not run by default whatever they take."""
+LEFT_OUT = ("full", "thorough", "peers", "studies", "site")
+"""Marks of tests that do not run by default whatever they take. What no other test executes is marked `thorough` by hand: it
+runs in `.ci/run` whatever it takes."""
 
 
 def function_of(nodeid):

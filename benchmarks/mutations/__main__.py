@@ -1,10 +1,10 @@
 """`python -m benchmarks.mutations [--count 200] [--seed 0] [--minutes 60] [--workers N] [--only PATH] [--tests PATH]
-[--own]`.
+[--own] [--thorough]`.
 
 Changes one random expression of filters, vehicles, tyres or sensors, in a copy, and runs the test files that execute its line
-until one fails. Prints the surviving mutations and the share of killed ones. Results are kept, so that the same call continues
-after an interruption; the coverage of the files is measured first, once. Both hold only for these sources, whose tests must
-pass.
+until one fails. Prints the functions that none of the tests executes, the surviving mutations and the share of killed ones.
+Results are kept, so that the same call continues after an interruption; the coverage of the files is measured first, once. Both
+hold only for these sources, whose tests must pass.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import threading
 import time
 from pathlib import Path
 
-from .choosing import choose, lines_beside, measured, test_files
+from .choosing import choose, lines_beside, measured, never_executed, test_files
 from .mutate import SWAPS, Mutation, mutations
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,6 +42,7 @@ COPIED = (
     "noxfile.py",
 )
 EXIT_NO_TESTS = 5
+WITH_LONG_CASES = ("-m", "not full and not peers and not studies and not site")
 
 SLOWER = 4.0
 """A mutation counts as noticed if a test file takes this many times its usual time."""
@@ -68,21 +69,26 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--own", action="store_true", help="tests of the changed file's own room alone: quicker, the share no larger"
     )
+    parser.add_argument("--thorough", action="store_true", help="also the single cases that take long, as .ci/run does")
     parser.add_argument("--kept", type=Path, default=ROOT / ".mutations", help="folder of what has been found")
     options = parser.parse_args(arguments)
     options.kept.mkdir(parents=True, exist_ok=True)
     (options.kept / ".gitignore").write_text("*\n")
     # Results for other sources do not apply to these.
-    options.kept = options.kept / digest()
+    options.kept = options.kept / (digest() + "-thorough" * options.thorough)
     options.kept.mkdir(exist_ok=True)
+    options.selected = WITH_LONG_CASES if options.thorough else ()
     end = time.monotonic() + 60.0 * options.minutes
     chosen = draw(options.count, options.seed, options.only)
     with concurrent.futures.ThreadPoolExecutor(options.workers) as pool:
-        look = lambda file: measured(ROOT, options.kept, file, environment(ROOT, options.kept), LONGEST)
+        env = environment(ROOT, options.kept)
+        look = lambda file: measured(ROOT, options.kept, file, env, LONGEST, options.selected)
         rooms = {Path(room).name for room in ROOMS}
         near = lambda file: not options.own or Path(file).parts[1] in rooms
         asked = [file for file in test_files(ROOT) if options.tests in file and near(file)]
         measurements = dict(zip(asked, pool.map(look, asked), strict=True))
+    for file, names in never_executed(ROOT, measurements, [p for p in sources() if options.only in p]).items():
+        print(f"{'not executed':>12}  {file}: {', '.join(names)}", flush=True)
     results = judge(chosen, measurements, options, end)
     return report(chosen, results, options.kept / f"results-{options.seed}-{options.count}.json")
 
@@ -111,9 +117,7 @@ def draw(count: int, seed: int, only: str = "") -> list[Mutation]:
 
     At most one in ten swaps arguments, because these mostly fail at once.
     """
-    paths = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
-    names = [str(path.relative_to(ROOT)) for path in paths]
-    found = [m for name in names if only in name for m in mutations(name, (ROOT / name).read_text())]
+    found = [m for name in sources() if only in name for m in mutations(name, (ROOT / name).read_text())]
     rng = random.Random(seed)
     swaps = _one_a_line(rng, [m for m in found if m.kind == SWAPS], count // 10)
     taken = {(m.file, m.line) for m in swaps}
@@ -121,6 +125,11 @@ def draw(count: int, seed: int, only: str = "") -> list[Mutation]:
     chosen = swaps + _one_a_line(rng, others, count - len(swaps))
     rng.shuffle(chosen)
     return chosen
+
+
+def sources() -> list[str]:
+    """Return the files that are changed, relative to the root."""
+    return [str(path.relative_to(ROOT)) for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 
 
 def _one_a_line(rng: random.Random, found: list[Mutation], count: int) -> list[Mutation]:
@@ -191,7 +200,7 @@ def tried(mutation: Mutation, measurements: dict, root: Path, options) -> str:
 
 def passes(root: Path, file: str, options, limit: float) -> str:
     """Return the result of one test file for a copy: `survived`, `killed` or `time-out`."""
-    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-p", "no:cacheprovider", file]
+    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-p", "no:cacheprovider", *options.selected, file]
     process = subprocess.Popen(
         command, cwd=root, env=environment(root, options.kept), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         start_new_session=True,

@@ -32,8 +32,11 @@ def test_files(root: Path) -> list[str]:
     )
 
 
-def measured(root: Path, kept: Path, file: str, environment: dict[str, str], limit: float) -> dict:
+def measured(
+    root: Path, kept: Path, file: str, environment: dict[str, str], limit: float, selected: tuple[str, ...] = ()
+) -> dict:
     """Return `seconds` of a test file, and the `lines` that it executes by file of the package; from `kept` if measured before.
+    `selected`: further arguments of pytest.
 
     It runs in a separate process, because functions that another file has traced would not be executed again. A file whose tests
     fail without a mutation cannot judge one: it ends the program.
@@ -44,7 +47,7 @@ def measured(root: Path, kept: Path, file: str, environment: dict[str, str], lim
     data = kept / (file.replace("/", "__") + ".coverage")
     start = time.monotonic()
     coverage = [sys.executable, "-m", "coverage"]
-    tests = ["-m", "pytest", "-n", "0", "-q", "-p", "no:cacheprovider", file]
+    tests = ["-m", "pytest", "-n", "0", "-q", "-p", "no:cacheprovider", *selected, file]
     ended = subprocess.run(
         [*coverage, "run", "--source=jaxveh", f"--data-file={data}", *tests],
         cwd=root, env=environment, capture_output=True, text=True, timeout=limit, check=False,
@@ -66,6 +69,25 @@ def measured(root: Path, kept: Path, file: str, environment: dict[str, str], lim
     for path in (data, shown):
         os.remove(path)
     return result
+
+
+def never_executed(root: Path, measurements: dict[str, dict], files: list[str]) -> dict[str, list[str]]:
+    """Return the names of the functions, by file, of which no test executes a line: none can notice what is wrong in them."""
+    found = {}
+    for file in files:
+        executed = {line for about in measurements.values() for line in about["lines"].get(file, ())}
+        tree = ast.parse((root / file).read_text())
+        functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+        names = [node.name for node in functions if (code := _lines_of_code(node)) and not executed & code]
+        if names:
+            found[file] = names
+    return found
+
+
+def _lines_of_code(function: ast.FunctionDef) -> set[int]:
+    """The lines of a function's statements; a docstring and an ellipsis are none."""
+    code = [node for node in function.body if not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant))]
+    return {line for node in code for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)}
 
 
 def choose(measurements: dict[str, dict], file: str, lines: set[int], own: bool = False) -> list[str]:

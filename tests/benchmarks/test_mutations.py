@@ -4,7 +4,7 @@ import ast
 from textwrap import dedent
 
 from benchmarks.mutations.__main__ import ROOT, draw
-from benchmarks.mutations.choosing import choose, lines_beside
+from benchmarks.mutations.choosing import choose, lines_beside, never_executed
 from benchmarks.mutations.mutate import mutations
 
 SOURCE = '''"""A text with 1 + 1 in it."""
@@ -93,3 +93,13 @@ def test_a_line_is_executed_with_its_statement_and_one_of_the_module_with_its_fu
     assert lines_beside(source, 10) == {10}
     assert lines_beside(source, 2) == {6, 7, 8, 9, 10, 11}
     assert lines_beside("SIZE = 3\n", 1) == {1}
+
+
+def test_a_function_that_no_test_executes_is_named(tmp_path):
+    (tmp_path / "f.py").write_text(SOURCE + '\n\ndef stub():\n    """Of a protocol."""\n    ...\n')
+    executed = lambda *lines: {"tests/a.py": {"seconds": 1.0, "lines": {"f.py": list(lines)}}}
+    # Definitions run on import.
+    assert never_executed(tmp_path, executed(3, 4, 7, 11), ["f.py"]) == {"f.py": ["check_speed", "force"]}
+    assert never_executed(tmp_path, executed(3, 4, 7, 11, 12), ["f.py"]) == {"f.py": ["check_speed", "force"]}
+    assert never_executed(tmp_path, executed(7, 8, 11), ["f.py"]) == {"f.py": ["force"]}
+    assert never_executed(tmp_path, executed(8) | {"tests/b.py": executed(16)["tests/a.py"]}, ["f.py"]) == {}

@@ -132,6 +132,7 @@ def test_simulation_based_calibration_of_nonlinear_models(name):
     assert found.is_calibrated() is right
 
 
+@pytest.mark.thorough
 def test_simulation_based_calibration_of_a_linear_model():
     rank = functools.partial(
         filters.simulation_based_calibration,
@@ -167,6 +168,7 @@ def test_draws_of_beliefs_have_their_moments():
         np.testing.assert_allclose(np.cov(drawn), covariance, atol=0.04 * np.max(covariance))
 
 
+@pytest.mark.thorough
 def test_log_likelihood_scatter_halves_with_four_times_the_particles():
     model = volatility()
     recording = ss.draw(model, Recording(np.arange(40.0), {}), jax.random.key(3)).recording

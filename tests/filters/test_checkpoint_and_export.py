@@ -72,6 +72,7 @@ def by_rows(name):
     return found
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", [*KINDS, *OTHERS])
 def test_a_broken_run_goes_on_bit_for_bit(name, tmp_path):
     whole = [belief for belief, *_ in by_rows(name)]
@@ -141,6 +142,7 @@ def exported(tmp_path_factory):
     return folders, json.loads(done.stdout)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", EXPORTED)
 def test_an_exported_filter_runs_without_this_package(name, exported):
     folder = exported[0][name]

@@ -51,6 +51,7 @@ class TestDelayed:
         np.testing.assert_allclose([m[-1] for m in found.mean], [m[-1] for m in exact.mean], rtol=1e-10)
         np.testing.assert_allclose([s[-1] for s in found.std], [s[-1] for s in exact.std], rtol=1e-10)
 
+    @pytest.mark.thorough
     def test_delayed_values_count_at_their_own_time(self):
         """A sensor whose value comes 0.25 s late, against rows in which it stands in its own place."""
         time = np.arange(24) * 0.1

@@ -1,6 +1,6 @@
 """What every filter makes of a short recording, by every setting that changes it, as recorded.
 
-Of those that test_every_filter runs by default, it compares what it found, too: here they are left to `-m full`.
+Of many filters no other test in `.ci/run` runs a step: they are all there, whatever they take.
 Particles, too: their draws are of a key, and rounding moves an ancestor about once in a thousand million draws.
 """
 
@@ -67,12 +67,8 @@ def short(filter_, model, rows, key):
     return jax.tree.map(lambda leaf: leaf[2::3] if leaf.ndim else leaf, kept)
 
 
-def case(name):
-    there = name in FILTERS and not FILTERS[name].seldom
-    return pytest.param(name, marks=[pytest.mark.full] if there else [])
-
-
-@pytest.mark.parametrize("name", [case(name) for name in MAKERS])
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", MAKERS)
 def test_estimates_are_those_recorded(name):
     filter_, linear = MAKERS[name](), name in FILTERS and FILTERS[name].linear
     model, rows = batch("linear" if linear else "pendulum")
@@ -95,6 +91,7 @@ SMOOTHERS = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", SMOOTHERS)
 def test_smoothed_estimates_are_those_recorded(name):
     filter_, method, lag = SMOOTHERS[name]

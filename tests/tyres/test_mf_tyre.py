@@ -209,6 +209,7 @@ def known(rows, mode):
     return {**given, "useMode": np.full(len(given["in_Fz"]), mode)}, columns
 
 
+@pytest.mark.thorough
 def test_version_62_is_the_reference_s():
     inputs, answers = known(mfeval_rows.VERSION_62, 121)
     found = evaluate(version_62(), inputs)
@@ -237,6 +238,7 @@ def test_version_52_is_the_reference_s():
         np.testing.assert_allclose(found[name][rows], expected[rows], rtol=rtol, err_msg=name)
 
 
+@pytest.mark.thorough
 def test_turn_slip_is_the_reference_s():
     """Of M_z three slips of the evaluator were mended before its answers were written down: the slope (4.99) is
     `QDZ8 + QDZ9 df_z`, not their product; F_y' (4.74) is that without spin; arccos ends at 1 instead of going complex."""
@@ -272,6 +274,7 @@ def test_turn_slip_is_smooth_at_zero_and_refused_in_52():
         dataclasses.replace(tyre, version=52)
 
 
+@pytest.mark.thorough
 def test_the_loaded_radius_of_62_carries_the_load_and_has_its_derivatives():
     tyre = version_62()
 
