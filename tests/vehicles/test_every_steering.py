@@ -16,6 +16,7 @@ from families import left_out, members
 from test_every_vehicle import CARS, ROUGH, SPEED, STEPS, in_mirror, inputs
 
 from jaxveh import InputError, io, statespace, tyres, vehicles
+from jaxveh._core.names import record
 from jaxveh.vehicles import kit
 
 pytestmark = pytest.mark.product
@@ -90,6 +91,21 @@ def test_every_steering_and_every_steered_car_is_here():
     assert set(ONE_EACH) - set(STEERED) == {"Longitudinal"}, "goes straight"
     assert {kind.__name__ for kind in kit.STEERINGS.values()} == set(STEERINGS)
     assert tuple(kit.STEERINGS) == io.kit.STEERINGS
+
+
+def test_axle_gains_are_the_angles_of_the_axles_over_a_small_steer():
+    car, small = vehicles.named_car("sedan", "seven-dof"), 1e-6
+    for name, make in STEERINGS.items():
+        steering = make()
+        if "steer" not in steering.inputs:
+            with pytest.raises(InputError, match="steer"):
+                steering.axle_gains(20.0)
+            continue
+        u = record("Inputs", {one: small if one == "steer" else 0.0 for one in steering.inputs})
+        for v_x in (2.0, 30.0):
+            at = steering.angles(car, u, v_x)
+            found = np.array([at.fl + at.fr, at.rl + at.rr]) / (2.0 * small)
+            np.testing.assert_allclose(found, steering.axle_gains(v_x), rtol=1e-9, atol=1e-12, err_msg=name)
 
 
 @pytest.mark.parametrize("pair", REFUSED, ids=" on ".join)

@@ -453,6 +453,23 @@ def made_mass(name):
     return car.mass
 
 
+def test_every_car_stands_on_two_axles_a_wheelbase_apart():
+    for name in CARS:
+        car = made(name)
+        (ahead, left), (ahead_too, right), (behind, left_too), (behind_too, right_too) = car.wheel_positions
+        assert ahead == ahead_too and behind == behind_too, name
+        # A car on one track has both wheels of an axle in the middle.
+        assert left == -right and left_too == -right_too and (left > 0) == (left_too > 0) and left >= 0, name
+        while hasattr(car, "vehicle"):
+            car = car.vehicle
+        if hasattr(car, "front_axle_to_cg"):
+            assert ahead == car.front_axle_to_cg and behind == -car.rear_axle_to_cg, name
+        elif hasattr(car, "wheelbase"):
+            assert ahead - behind == pytest.approx(float(car.wheelbase), rel=1e-12), name
+        else:
+            assert name == "Longitudinal" and ahead == behind == left == 0.0, "a car without a length"
+
+
 @pytest.mark.parametrize("name", CARS)
 def test_parameters_outside_their_domain_raise_by_name(name):
     car = made(name)
