@@ -123,6 +123,7 @@ def faulty():
     return base, np.stack(truth)[:, rows // 2 + 10 :], recording, recording.replace(y1=lies)
 
 
+@pytest.mark.thorough
 def test_a_faulty_local_is_isolated_and_a_sound_one_is_not():
     base, truth, sound, lying = faulty()
     error = lambda filter_, recording: np.sqrt(
