@@ -415,7 +415,7 @@ def test_a_gradient_that_is_no_slope_is_a_number(name):
 
 @pytest.mark.parametrize("name", names("straight"))
 def test_its_estimates_are_those_recorded(name):
-    """Of both models; variants of another filter (`seldom`) are on record in test_recorded_estimates, too."""
+    """Of both models; of a short recording they are on record in test_recorded_estimates, too."""
     kept = {}
     for model in BOTH if not FILTERS[name].linear else BOTH[:1]:
         (value, estimate), _ = found(name, model)
