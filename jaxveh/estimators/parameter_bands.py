@@ -13,10 +13,11 @@ import numpy as np
 
 from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, put
 from jaxveh._core.recording import Recording
-from jaxveh.filters import AbstractFilter, Estimate, SmoothedEstimate, run, smooth
+from jaxveh.filters import AbstractFilter, Estimate, SmoothedEstimate, run
+from jaxveh.filters import kit as filters
 from jaxveh.fitting import Fit
 from jaxveh.fitting import kit as fitting
-from jaxveh.statespace import StateSpace, kit
+from jaxveh.statespace import Row, StateSpace, kit
 
 WIDER = 1.75
 """The bands' width over that from the members and their filters, since no member has other equations (a load that shifts
@@ -80,20 +81,43 @@ def estimate_with_members(
     filter: AbstractFilter, model: StateSpace, members: Members, log: Recording, smoothed: bool
 ) -> Estimate | SmoothedEstimate:
     """The estimate of a model, from all rows or from those up to each, with standard deviations that include its `members`."""
-    centre = (smooth if smoothed else run)(filter, model, log)
-    means, stds = _of_each(filter, members.models, log, smoothed)
+    centre: Estimate | SmoothedEstimate
+    if smoothed:
+        # Together, since a smoother alone is another program, which takes as long to compile as this one to run ten times.
+        rows = model.rows(log)
+        filter.check(model)
+        centre, means, stds = _smoothed_with_each(filter, model, members.models, rows)
+        centre = dataclasses.replace(
+            centre, time=log.time, filtered=dataclasses.replace(centre.filtered, time=log.time)
+        )
+        kit.raise_failure(centre.filtered, filter, model, log)
+    else:
+        # Identical to a live loop to the last bit: a batch that is written out in scalars rounds differently.
+        centre = run(filter, model, log)
+        means, stds = _filtered_of_each(filter, members.models, model.rows(log))
     return dataclasses.replace(centre, std=members.about(centre.mean, means, stds))
 
 
 @eqx.filter_jit
-def _of_each(filter: AbstractFilter, models: StateSpace, log: Recording, smoothed: bool) -> tuple[Any, Any]:
+def _smoothed_with_each(
+    filter: AbstractFilter, model: StateSpace, models: StateSpace, rows: Row
+) -> tuple[SmoothedEstimate, Any, Any]:
+    """The smoothed estimate of the model, and means and standard deviations of the `models` on a leading axis."""
+    put_first = lambda one, many: jnp.concatenate([jnp.asarray(one, many.dtype)[None], many])
+    (single, rest), (several, _) = eqx.partition(model, eqx.is_array), eqx.partition(models, eqx.is_array)
+    every = eqx.combine(jax.tree.map(put_first, single, several), rest)
+    found = eqx.filter_vmap(lambda one: filters.rauch_tung_striebel(filter, one, rows), in_axes=(eqx.if_array(0),))(
+        every
+    )
+    first, others = (jax.tree.map(lambda leaf, at=at: leaf[at], found) for at in (0, slice(1, None)))
+    return first, others.mean, others.std
+
+
+@eqx.filter_jit
+def _filtered_of_each(filter: AbstractFilter, models: StateSpace, rows: Row) -> tuple[Any, Any]:
     def one(model):
-        if smoothed:
-            found = smooth(filter, model, log, throw=False)
-        else:
-            # Identical to a live loop to the last bit: a batch that is written out in scalars rounds differently.
-            shown, steps = ("mean", "std"), kit.Steps.whole
-            found, _ = kit.scan_in_form(filter, model, model.rows(log), None, lambda belief: None, shown, steps)
+        shown, steps = ("mean", "std"), kit.Steps.whole
+        found, _ = kit.scan_in_form(filter, model, rows, None, lambda belief: None, shown, steps)
         return found.mean, found.std
 
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0),))(models)

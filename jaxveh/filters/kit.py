@@ -30,6 +30,7 @@ from jaxveh.filters.particle import (
     replace_lost,
     without,
 )
+from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
 from jaxveh.filters.wrappers.base import (
     AbstractRemembering,
     Remembering,
@@ -124,6 +125,7 @@ __all__ = [
     "log_prob",
     "make_info",
     "presence",
+    "rauch_tung_striebel",
     "replace_lost",
     "row_values",
     "smoothing_of",

@@ -94,7 +94,7 @@ def rear_axle_points(source: Any, estimate: Any, recording: Recording, *, least_
     reach = 1.1 * float(np.max(np.abs(slip), initial=np.radians(2.0)))
     at = np.linspace(-reach, reach, POINTS)
     low, high = _band(source, at) if isinstance(source, Calibration) else (None, None)
-    return AxlePoints(at, _at(at, _curve(system)), low, high, slip, share, left >= TURNING_ALONE)
+    return AxlePoints(at, _at(at, eqx.filter_jit(_curve)(system)), low, high, slip, share, left >= TURNING_ALONE)
 
 
 def _curve(system: RearAxle) -> tuple[Any, Any]:
@@ -134,6 +134,7 @@ def _band(source: Calibration, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray
         values = [p.domain.forward(value) for p, value in zip(fit.chosen, point, strict=True)]
         return _curve(put(fit.model, fit.chosen, values).system)
 
-    angles, shares = eqx.filter_jit(eqx.filter_vmap(curve))(jnp.asarray(points, fit.unconstrained.dtype))
+    curves = eqx.filter_jit(eqx.filter_vmap(curve))(jnp.asarray(points, fit.unconstrained.dtype))
+    angles, shares = map(np.asarray, curves)
     low, high = np.nanquantile([_at(slip, one) for one in zip(angles, shares, strict=True)], (0.025, 0.975), axis=0)
     return low, high

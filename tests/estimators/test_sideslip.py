@@ -339,7 +339,9 @@ def test_bands_know_that_parameters_are_uncertain(monkeypatch):
     recording = log().without("v_y")
     sure = estimators.sideslip.estimate(fit.model, recording)
     found = estimators.sideslip.estimate(calibrated(), recording)
-    np.testing.assert_array_equal(found.mean.sideslip, sure.mean.sideslip)
+    # All but the bands is the model's own estimate, to rounding: it runs in one batch with its members.
+    for one, other in zip(*(jax.tree.leaves(dataclasses.replace(e, std=None)) for e in (found, sure)), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-9)
     assert np.mean(found.std.sideslip) > 1.2 * parameter_bands.WIDER * np.mean(sure.std.sideslip)
     causal = estimators.sideslip.estimate(calibrated(), recording.rows(slice(0, 300)), smoothed=False)
     sure = estimators.sideslip.estimate(fit.model, recording.rows(slice(0, 300)), smoothed=False)

@@ -182,6 +182,14 @@ def test_each_finding(old, new, expected):
     assert any(line.startswith(expected) for line in found(GOOD.replace(old, new, 1))), found(GOOD.replace(old, new, 1))
 
 
+def test_the_nominal_load_is_the_scaled_one():
+    scaled = GOOD.replace("LMUX = 1", "LMUX = 1\nLFZO = 0.4")
+    remark, *others = found(scaled)
+    assert remark.startswith("scaling LFZO = 0.4: not 1") and not others
+    soft = found(scaled.replace("PKX1 = 20", "PKX1 = 3"))
+    assert any(line.startswith("slip stiffness over load is 3 at nominal load") for line in soft)
+
+
 @pytest.mark.parametrize("name", ["F_x", "F_y"])
 def test_what_is_left_of_a_force_is_the_share_of_it_alone(name):
     """The number of a finding, computed anew: the least over the other slip, at the load and the slip that it names."""
