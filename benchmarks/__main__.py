@@ -20,6 +20,7 @@ EXPERIMENTS = (
     "tyres",
     "fits",
     "gradients",
+    "methods",
     "compile_times",
 )
 
