@@ -81,43 +81,37 @@ def estimate_with_members(
     filter: AbstractFilter, model: StateSpace, members: Members, log: Recording, smoothed: bool
 ) -> Estimate | SmoothedEstimate:
     """The estimate of a model, from all rows or from those up to each, with standard deviations that include its `members`."""
-    centre: Estimate | SmoothedEstimate
-    if smoothed:
-        # Together, since a smoother alone is another program, which takes as long to compile as this one to run ten times.
-        rows = model.rows(log)
-        filter.check(model)
-        centre, means, stds = _smoothed_with_each(filter, model, members.models, rows)
-        centre = dataclasses.replace(
-            centre, time=log.time, filtered=dataclasses.replace(centre.filtered, time=log.time)
-        )
-        kit.raise_failure(centre.filtered, filter, model, log)
-    else:
-        # Identical to a live loop to the last bit: a batch that is written out in scalars rounds differently.
+    rows = model.rows(log)
+    if not smoothed:
         centre = run(filter, model, log)
-        means, stds = _filtered_of_each(filter, members.models, model.rows(log))
-    return dataclasses.replace(centre, std=members.about(centre.mean, means, stds))
+        return dataclasses.replace(centre, std=_std_of_members(filter, members, rows, centre.mean))
+    filter.check(model)
+    found = _smoothed_with_members(filter, model, members, rows)
+    found = dataclasses.replace(found, time=log.time, filtered=dataclasses.replace(found.filtered, time=log.time))
+    kit.raise_failure(found.filtered, filter, model, log)
+    return found
 
 
 @eqx.filter_jit
-def _smoothed_with_each(
-    filter: AbstractFilter, model: StateSpace, models: StateSpace, rows: Row
-) -> tuple[SmoothedEstimate, Any, Any]:
-    """The smoothed estimate of the model, and means and standard deviations of the `models` on a leading axis."""
+def _smoothed_with_members(filter: AbstractFilter, model: StateSpace, members: Members, rows: Row) -> SmoothedEstimate:
+    # One batch: the model's smoother alone would be another program, and take ten times as long to compile as to run.
     put_first = lambda one, many: jnp.concatenate([jnp.asarray(one, many.dtype)[None], many])
-    (single, rest), (several, _) = eqx.partition(model, eqx.is_array), eqx.partition(models, eqx.is_array)
+    (single, rest), several = eqx.partition(model, eqx.is_array), eqx.filter(members.models, eqx.is_array)
     every = eqx.combine(jax.tree.map(put_first, single, several), rest)
-    found = eqx.filter_vmap(lambda one: filters.rauch_tung_striebel(filter, one, rows), in_axes=(eqx.if_array(0),))(
-        every
-    )
-    first, others = (jax.tree.map(lambda leaf, at=at: leaf[at], found) for at in (0, slice(1, None)))
-    return first, others.mean, others.std
+    smooth = lambda one: filters.rauch_tung_striebel(filter, one, rows)
+    found = eqx.filter_vmap(smooth, in_axes=(eqx.if_array(0),))(every)
+    centre, others = (jax.tree.map(lambda leaf, at=at: leaf[at], found) for at in (0, slice(1, None)))
+    return dataclasses.replace(centre, std=members.about(centre.mean, others.mean, others.std))
 
 
 @eqx.filter_jit
-def _filtered_of_each(filter: AbstractFilter, models: StateSpace, rows: Row) -> tuple[Any, Any]:
+def _std_of_members(filter: AbstractFilter, members: Members, rows: Row, centre: Any) -> Any:
+    """The standard deviations about the means `centre` of a filter."""
+
+    # Identical to a live loop to the last bit: a batch that is written out in scalars rounds differently.
     def one(model):
         shown, steps = ("mean", "std"), kit.Steps.whole
         found, _ = kit.scan_in_form(filter, model, rows, None, lambda belief: None, shown, steps)
         return found.mean, found.std
 
-    return eqx.filter_vmap(one, in_axes=(eqx.if_array(0),))(models)
+    return members.about(centre, *eqx.filter_vmap(one, in_axes=(eqx.if_array(0),))(members.models))
