@@ -326,6 +326,7 @@ def test_a_smoother_knows_more_than_a_filter():
     assert smooth < causal
 
 
+@pytest.mark.thorough
 def test_bands_know_that_parameters_are_uncertain(monkeypatch):
     fit = calibrated().fit
     models = parameter_bands.members_of_fit(fit).models
