@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -13,7 +15,8 @@ from jaxveh._core.names import record
 from jaxveh._core.recording import Recording
 from jaxveh.io import CarSpecification, with_road_steer
 from jaxveh.statespace import Propagate, Row
-from jaxveh.vehicles import SingleTrack, from_specification, linear
+from jaxveh.tyres import AbstractDynamicTyre, Linear
+from jaxveh.vehicles import SingleTrack, from_specification, linear, linear_single_track
 
 
 def _derivatives(car: SingleTrack, t, x, u):
@@ -23,20 +26,37 @@ def _derivatives(car: SingleTrack, t, x, u):
 PROPAGATE = Propagate(_derivatives)
 
 
-def open_loop(car: SingleTrack, recording: Recording) -> dict[str, np.ndarray]:
+def open_loop(car: Any, recording: Recording) -> dict[str, np.ndarray]:
     """Simulate a linear single track from `steer` (rad) and `v_x` (m/s) alone, from straight running at the first row.
 
-    Uses the car's own cornering stiffnesses at its static loads, without load transfer. **Returns** by name, (T,) each: `v_y`
-    (m/s), `yaw_rate` (rad/s), `sideslip` (rad). **Raises** `InputError` for missing channels, or a car that needs more inputs
-    than `steer`.
+    It has the axles' own cornering stiffnesses at their static loads, without load transfer: `car` is a single track, or any car
+    of which `vehicles.linear_single_track` makes one. **Returns** by name, (T,) each: `v_y` (m/s), `yaw_rate` (rad/s),
+    `sideslip` (rad). **Raises** `InputError` for missing channels, for a car without axles, or one that needs more inputs than
+    `steer`.
     """
-    if car.steering.inputs != ("steer",):
+    plain = _linear_car(car)
+    if plain.steering.inputs != ("steer",):
         raise InputError(
-            f"open_loop: car.steering = {type(car.steering).__name__}: needs {', '.join(car.steering.inputs)}; must be a "
+            f"open_loop: car.steering = {type(plain.steering).__name__}: needs {', '.join(plain.steering.inputs)}; must be a "
             "steering whose only input is steer."
         )
-    found = open_loop_of(car, recording.time, recording["steer"], recording["v_x"])
+    dtype, time = plain.mass.dtype, recording.time
+    if isinstance(time, np.ndarray) and dtype != np.float64:
+        time = time - time[0]
+    found = open_loop_of(plain, jnp.asarray(time, dtype), recording["steer"], recording["v_x"])
     return {name: np.asarray(values) for name, values in found.items()}
+
+
+def _linear_car(car: Any) -> SingleTrack:
+    """The single track on linear tyres of a car, whose stiffness does not depend on the load."""
+    if isinstance(car, SingleTrack) and not any(isinstance(t, AbstractDynamicTyre) for t in (car.front, car.rear)):
+        return linear(eqx.tree_at(lambda c: c.cg_height, car, None, is_leaf=lambda leaf: leaf is None))
+    plain = linear_single_track(car)
+    return SingleTrack(
+        mass=plain.mass, yaw_inertia=plain.yaw_inertia, front_axle_to_cg=plain.front_axle_to_cg,
+        rear_axle_to_cg=plain.rear_axle_to_cg, front=Linear(plain.front_stiffness), rear=Linear(plain.rear_stiffness),
+        steering=plain.steering,
+    )  # fmt: skip
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
@@ -50,11 +70,10 @@ def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndar
 
 
 @eqx.filter_jit
-def open_loop_of(car: SingleTrack, time, steer, v_x) -> dict[str, jax.Array]:
+def open_loop_of(car: Any, time, steer, v_x) -> dict[str, jax.Array]:
     """The same as `open_loop` for (T,) arrays, which may be traced."""
-    plain = linear(eqx.tree_at(lambda c: c.cg_height, car, None, is_leaf=lambda leaf: leaf is None))
     inputs = {"steer": jnp.asarray(steer), "v_x": jnp.asarray(v_x)}
-    states = _drive(plain, Row(jnp.asarray(time), record("Inputs", inputs), ()))
+    states = _drive(_linear_car(car), Row(jnp.asarray(time), record("Inputs", inputs), ()))
     return {
         "v_y": states.v_y, "yaw_rate": states.yaw_rate, "sideslip": numerics.arctan2(states.v_y, inputs["v_x"])
     }  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import jax
@@ -9,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
-from jaxveh.vehicles.base import GRAVITY
+from jaxveh.vehicles.base import GRAVITY, AbstractVehicle
 from jaxveh.vehicles.linear_handling import LinearSingleTrack
 from jaxveh.vehicles.steering import FrontSteering
 
@@ -23,10 +24,15 @@ def linear_single_track(car: Any, *, cg_height: Any = None) -> LinearSingleTrack
     `car` is a single track, whose tyres are those of the axles, or a car with tracks, whose tyres are those of the wheels. In
     the second case the stiffness of an axle is twice that of a wheel with half its load. The `steering` is that of the car. The
     slope is that of the lateral force over slip angle at zero slip (of the steady force for a tyre with states). With a
-    `cg_height` (m) the stiffness is proportional to load, see `LinearSingleTrack`.
+    `cg_height` (m) the stiffness is proportional to load, see `LinearSingleTrack`. Of a car inside another (`AntiLock`,
+    `Steered`, ...) it is the model of the inner one, and of a `LinearSingleTrack` that car itself with the given `cg_height`.
 
     **Raises** `InputError` for a car without mass, yaw inertia, axle distances or tyres.
     """
+    while isinstance(inner := getattr(car, "vehicle", None), AbstractVehicle):
+        car = inner
+    if isinstance(car, LinearSingleTrack):
+        return dataclasses.replace(car, cg_height=cg_height)
     needed = ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg", "front", "rear")
     missing = [name for name in needed if not hasattr(car, name)]
     if missing:

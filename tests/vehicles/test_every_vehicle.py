@@ -18,7 +18,7 @@ from families import left_out
 from four_wheel_cars import drive as driven
 from jax.flatten_util import ravel_pytree
 
-from jaxveh import InputError, manoeuvres, simulation, statespace, tyres, vehicles
+from jaxveh import InputError, Recording, estimators, manoeuvres, simulation, statespace, tyres, vehicles
 from jaxveh._core.bijectors import Positive
 from jaxveh._core.names import record
 from jaxveh.roads import LEVEL, Ground
@@ -531,3 +531,25 @@ def test_its_fastest_pole_is_the_largest_eigenvalue(name):
             low, at, now = (statespace.cast(some, dtype) for some in (car, shaped(flat), t))
             # 1/s: a car without dynamics of its own has no pole, only rounding.
             assert float(pole(low, now, at)) == pytest.approx(expected, rel=0.02, abs=1e-3)
+
+
+NO_AXLES = ("Kinematic", "KinematicTrailer", "Longitudinal")
+"""Cars without tyres: no linear single track is made of them."""
+
+
+@pytest.mark.thorough
+def test_every_car_with_axles_has_a_linear_single_track_and_an_open_loop():
+    """The open loop ends where the linear car's own formulas say: the drive is long, and its steering held."""
+    time, steer = np.arange(0.0, 4.0, 0.01), 0.01
+    log = Recording(time, {"steer": np.full(time.size, steer), "v_x": np.full(time.size, SPEED)})
+    for name in CARS:
+        if name in NO_AXLES:
+            with pytest.raises(InputError, match=rf"{name} has no .*front, rear"):
+                vehicles.linear_single_track(made(name))
+            continue
+        plain = vehicles.linear_single_track(made(name))
+        assert float(plain.mass) == float(made_mass(name))
+        found = estimators.open_loop(made(name), log)
+        np.testing.assert_allclose(found["yaw_rate"][-1], steer * plain.yaw_rate_gain(SPEED), rtol=1e-3, err_msg=name)
+        sideslip = steer * plain.sideslip_gain(SPEED)
+        np.testing.assert_allclose(found["sideslip"][-1], sideslip, rtol=1e-2, atol=2e-6, err_msg=name)
