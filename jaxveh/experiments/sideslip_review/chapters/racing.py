@@ -230,7 +230,9 @@ def _nothing(drives: Mapping[str, np.ndarray]) -> dict[tuple[str, str], dict[str
                     error = np.asarray(values) - drives[f"true.{name}"][place]
                     held = np.cumprod(np.abs(drives["true.sideslip"][place]) < LOST) > 0
                     held[: round(WARM_UP / STEP)] = False
-                    found[quantity, name]["rmse"][place] = np.sqrt(np.nanmean(error[held] ** 2))
+                    squares = error[held & np.isfinite(error)] ** 2
+                    # A car that spins in the first seconds has no row that is scored.
+                    found[quantity, name]["rmse"][place] = np.sqrt(np.mean(squares)) if squares.size else np.nan
     return found
 
 
