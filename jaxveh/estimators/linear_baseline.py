@@ -34,21 +34,26 @@ def open_loop(car: Any, recording: Recording) -> dict[str, np.ndarray]:
     `sideslip` (rad). **Raises** `InputError` for missing channels, for a car without axles, or one that needs more inputs than
     `steer`.
     """
-    plain = _linear_car(car)
-    if plain.steering.inputs != ("steer",):
-        raise InputError(
-            f"open_loop: car.steering = {type(plain.steering).__name__}: needs {', '.join(plain.steering.inputs)}; must be a "
-            "steering whose only input is steer."
-        )
-    dtype, time = plain.mass.dtype, recording.time
-    if isinstance(time, np.ndarray) and dtype != np.float64:
+    time = recording.time
+    if isinstance(time, np.ndarray):
+        # So that float32 resolves the steps of a log whose stamps count from 1970.
         time = time - time[0]
-    found = open_loop_of(plain, jnp.asarray(time, dtype), recording["steer"], recording["v_x"])
+    found = open_loop_of(car, time, recording["steer"], recording["v_x"])
     return {name: np.asarray(values) for name, values in found.items()}
 
 
 def _linear_car(car: Any) -> SingleTrack:
     """The single track on linear tyres of a car, whose stiffness does not depend on the load."""
+    plain = _on_linear_tyres(car)
+    if plain.steering.inputs != ("steer",):
+        raise InputError(
+            f"open_loop: car.steering = {type(plain.steering).__name__}: needs {', '.join(plain.steering.inputs)}; must be a "
+            "steering whose only input is steer."
+        )
+    return plain
+
+
+def _on_linear_tyres(car: Any) -> SingleTrack:
     if isinstance(car, SingleTrack) and not any(isinstance(t, AbstractDynamicTyre) for t in (car.front, car.rear)):
         return linear(eqx.tree_at(lambda c: c.cg_height, car, None, is_leaf=lambda leaf: leaf is None))
     plain = linear_single_track(car)
