@@ -19,8 +19,15 @@ QUANTITIES = {
 SINCE_1970 = 1.7e9
 
 
+@pytest.fixture(scope="module")
+def drive():
+    """Time and channels; made in float64, as they are kept for other tests."""
+    log = test_sideslip.log(300).without("v_y")
+    return np.asarray(log.time), {name: np.asarray(values, np.float32) for name, values in log.channels.items()}
+
+
 @pytest.fixture(autouse=True)
-def float32():
+def float32(drive):
     with jax.enable_x64(False):
         yield
 
@@ -48,14 +55,14 @@ def test_a_method(quantity):
 
 
 @pytest.mark.parametrize("smoothed", [pytest.param(True, marks=pytest.mark.thorough), False])
-def test_an_estimate_with_bands(smoothed):
+def test_an_estimate_with_bands(smoothed, drive):
     def read(log):
         found = estimators.sideslip.estimate(test_sideslip.CAR, log, smoothed=smoothed)
         return found.mean.sideslip, found.std.sideslip
 
-    assert_the_same(read, test_sideslip.log(300).without("v_y"))
+    assert_the_same(read, Recording(*drive))
 
 
-def test_an_open_loop():
+def test_an_open_loop(drive):
     car = vehicles.linear_single_track(vehicles.passenger_car())
-    assert_the_same(lambda log: estimators.open_loop(car, log), test_sideslip.log(300))
+    assert_the_same(lambda log: estimators.open_loop(car, log), Recording(*drive))
