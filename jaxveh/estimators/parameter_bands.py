@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, put
+from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, put, strong
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, Estimate, SmoothedEstimate, run
 from jaxveh.filters import kit as filters
@@ -81,11 +81,14 @@ def estimate_with_members(
     filter: AbstractFilter, model: StateSpace, members: Members, log: Recording, smoothed: bool
 ) -> Estimate | SmoothedEstimate:
     """The estimate of a model, from all rows or from those up to each, with standard deviations that include its `members`."""
-    rows = model.rows(log)
     if not smoothed:
         centre = run(filter, model, log)
-        return dataclasses.replace(centre, std=_std_of_members(filter, members, rows, centre.mean))
+        return dataclasses.replace(centre, std=_std_of_members(filter, members, model.rows(log), centre.mean))
+    # As `filters.smooth` does.
+    model = strong(model)
+    kit.check_told(filter, model)
     filter.check(model)
+    rows = model.rows(log)
     found = _smoothed_with_members(filter, model, members, rows)
     found = dataclasses.replace(found, time=log.time, filtered=dataclasses.replace(found.filtered, time=log.time))
     kit.raise_failure(found.filtered, filter, model, log)

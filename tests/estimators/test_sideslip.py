@@ -326,6 +326,14 @@ def test_a_smoother_knows_more_than_a_filter():
     assert smooth < causal
 
 
+@pytest.mark.parametrize("smoothed", [True, False])
+def test_a_class_in_place_of_a_filter_is_named_with_bands_too(smoothed):
+    with pytest.raises(InputError, match="filter = Extended: is a class; make one of it"):
+        estimators.sideslip.estimate(
+            CAR, log().rows(slice(0, 50)).without("v_y"), filter=filters.Extended, smoothed=smoothed
+        )
+
+
 @pytest.mark.thorough
 def test_bands_know_that_parameters_are_uncertain(monkeypatch):
     fit = calibrated().fit
