@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from shared_data import shared
 
-from jaxveh import InputError, Recording, estimators, io, sensors, vehicles
+from jaxveh import InputError, Recording, estimators, filters, io, sensors, vehicles
 from jaxveh._core.parameter import pick
 from jaxveh.estimators import parameter_bands
 from jaxveh.estimators.cleaning import FORCE_CUTOFF
