@@ -84,9 +84,7 @@ def estimate_with_members(
     if not smoothed:
         centre = run(filter, model, log)
         return dataclasses.replace(centre, std=_std_of_members(filter, members, model.rows(log), centre.mean))
-    # As `filters.smooth` does.
     model = strong(model)
-    kit.check_told(filter, model)
     filter.check(model)
     rows = model.rows(log)
     found = _smoothed_with_members(filter, model, members, rows)
