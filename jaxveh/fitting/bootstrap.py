@@ -47,6 +47,7 @@ def bootstrap(
     **Raises** `InputError` for fewer than two fits, or fewer than five parts.
     """
     check_whole("count", count, 2)
+    check_whole("max_steps", max_steps)
     check_key("bootstrap", key)
     parts = problem.units()
     group = np.arange(parts) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]

@@ -53,7 +53,8 @@ class LikelihoodProblem(AbstractFilterProblem):
     def search(self, z, max_steps, tolerance):
         solver = optx.BFGS(rtol=tolerance, atol=tolerance)
         found = optx.minimise(_cost, solver, z, self, max_steps=max_steps, throw=False)
-        return SearchEnd(found.value, found.stats["num_steps"], found.result == optx.RESULTS.successful)
+        converged = found.result == optx.RESULTS.successful
+        return SearchEnd(found.value, found.stats["num_steps"], converged, found.state.f_info.f)
 
     def covariance(self, z):
         return jnp.linalg.inv(hessian(self.cost, z)), jnp.ones(z.shape, bool)

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 
-from jaxveh._core.errors import InputError, check_positive, is_concrete
+from jaxveh._core.errors import InputError, check_positive, check_whole, is_concrete
 from jaxveh._core.parameter import Parameter, Where, pick, strong
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
@@ -231,6 +231,7 @@ def prediction_error(
     whitened innovations, or recordings of different length; `FilterError` if it does not converge (`throw`).
     """
     check_positive("tolerance", tolerance)
+    check_whole("max_steps", max_steps)
     problem = pose_prediction_error(
         filter, model, recordings, where, prior=prior, centre=centre, target=target, warm_up=warm_up
     )

@@ -121,8 +121,8 @@ def descend(problem: RigProblem, z, max_steps: int | None, tolerance: float, lim
     solver = LevenbergMarquardt(rtol=tolerance, atol=tolerance, quadratic=normal_equations)
     options = {} if limit is None else {"limit": limit}
     found = optx.minimise(loss, solver, z, problem, options=options, max_steps=max_steps, throw=False)
-    lowered = loss(z, problem) - found.state.at.cost
-    return Descent(SearchEnd(found.value, found.stats["num_steps"], found.state.done), lowered)
+    cost = found.state.at.cost
+    return Descent(SearchEnd(found.value, found.stats["num_steps"], found.state.done, cost), loss(z, problem) - cost)
 
 
 def loss(z, problem: RigProblem):

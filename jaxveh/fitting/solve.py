@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from jaxveh._core.errors import check_whole
 from jaxveh._core.result import Result, code
 from jaxveh.fitting.problem import AbstractProblem, SearchEnd, by_name, in_units
 from jaxveh.fitting.result import Fit
@@ -29,8 +30,9 @@ def solve(
     `start`: coordinates (n,), by default the problem's own; the optimum does not depend on it, and has no derivative with
     respect to it. `tolerance`: of the problem's solver. Without `standard_errors` they are NaN.
 
-    **Returns** a `Fit`; its `result` states how it ended.
+    **Returns** a `Fit`; its `result` states how it ended. **Raises** `InputError` for `max_steps` below one.
     """
+    check_whole("max_steps", max_steps)
     # As an array, so that another tolerance does not compile another program.
     return _solve(problem, start, jnp.asarray(tolerance), max_steps=max_steps, standard_errors=standard_errors)
 

@@ -195,6 +195,22 @@ def test_a_search_that_stops_short_says_so(case, problem):
     assert all(np.isnan(leaf) for leaf in jax.tree.leaves(fit.parameters_std))
 
 
+def test_what_a_search_says_of_its_end_is_so(case, problem):
+    """Cost and uncertainty that a search knows are used as they are, also where it stops short of the optimum."""
+    found = jax.jit(lambda start: problem.search(start, 3, case.tolerance))(problem.start())
+    np.testing.assert_allclose(found.cost, jax.jit(lambda z: problem.cost(z))(found.z), rtol=1e-10)
+    if found.uncertainty is not None:
+        there = jax.jit(lambda z: problem.covariance(z))(found.z)
+        jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-7, atol=1e-14), found.uncertainty, there)
+
+
+def test_no_step_at_all_is_refused(problem):
+    """A search that takes no step knows nothing of its end."""
+    for most in (0, 2.5):
+        with pytest.raises(InputError, match=f"max_steps = {most}: must be a whole number of at least 1"):
+            fitting.solve(problem, max_steps=most)
+
+
 def test_derivatives_equal_differences(problem, changed, slopes):
     """With respect to data, noise and prior, of parameters: in reverse mode, and in forward mode."""
     h = 2e-3
