@@ -35,7 +35,10 @@ WIDEST = 1.0 * DEGREE
 
 
 LINEAR = 4.0
-"""m/s^2: from about here a tyre's slip angle grows faster than its force."""
+"""m/s^2: from about here a tyre's slip angle grows faster than its force, on a dry road."""
+
+FALL = 4.0
+"""How fast the weight of a slip angle falls beyond the gate: with 1 or 2 a sliding axle still turns into a bank."""
 
 SLOWEST = 3.0
 """m/s: the speed at which the road passes is at least this, so that the law of its bank has a spread at standstill."""
@@ -64,12 +67,14 @@ class Leaning(AbstractMethod):
     ago and does not depend on tyres; `roll_rate`, the rate of roll and bank plus a part of the yaw rate when the car points
     uphill. None of them can distinguish a constant bank from the accelerometer's offset. The two are separated only because
     roads bank to either side about level, while the offset stays. So the standard deviation of the bank falls slowly, and an
-    offset from earlier drives helps (`a_y_offset`).
+    offset from earlier drives helps (`a_y_offset`). An axle that slides has a slip angle that its force does not give, on ice
+    at any acceleration: the further off it is, the less it counts (`slip_gate`), and the kinematics hold alone.
 
     **Parameters**: `rear_axle_to_cg` (m); `rear_compliance` (rad/(m/s^2)): the rear axle's slip angle per lateral
     acceleration, `m l_f / (l C_r)`; `roll_gradient` (rad/(m/s^2)), `roll_frequency` (Hz), `roll_damping` (-) of the body over
     the road; `bank_spread` (rad): the standard deviation of banks; `bank_length`, `bank_edge` (m): the distances over which a
     bank is forgotten and over which it begins to change; `slip_error` (rad), whose correlation time is `slip_error_time` (s);
+    `slip_gate` (-): a slip angle that is off by more than this many of its predicted standard deviations counts less;
     `roll_rate_noise` (rad/s): the noise of the gyroscope about x; `across` (m/s): the noise of the satellites' lateral
     velocity; `delay` (s) of the satellites; `a_y_offset` (m/s^2): the accelerometer's offset as known beforehand;
     `a_y_offset_spread` (m/s^2), `gyro_offset_spread` (rad/s): standard deviations of the offsets at the start; `scale_spread`
@@ -87,6 +92,7 @@ class Leaning(AbstractMethod):
     bank_edge: jax.Array = positive("m", default=6.0)
     slip_error: jax.Array = positive("rad", default=0.0008)
     slip_error_time: jax.Array = positive("s", default=0.1)
+    slip_gate: jax.Array = positive("-", default=1.0)
     roll_rate_noise: jax.Array = positive("rad/s", default=0.006)
     across: jax.Array = positive("m/s", default=0.06)
     delay: jax.Array = parameter("s", scale=0.1, default=0.14)
@@ -191,7 +197,7 @@ class Leaning(AbstractMethod):
         lasting = jnp.square(self.slip_error) * 2.0 * self.slip_error_time / jnp.maximum(dt, 1e-3)
         slip = lasting * (1.0 + jnp.square(jnp.square(heard["a_y"] / LINEAR)))
         there = heard["silence"] < SILENCE
-        belief = correct(belief, rear, slip, there, State)
+        belief = correct(belief, rear, slip, there, State, self.slip_gate, FALL)
         belief = correct(belief, course, jnp.square(self.across / fast), satellites & (v_x > 1.0), State, 3.0)
         return correct(belief, rolling, jnp.square(self.roll_rate_noise), gyroscope, State)
 

@@ -97,18 +97,25 @@ def move(belief: Belief, step: Callable[[Any], Any], variances: Mapping[str, Any
 
 
 def correct(
-    belief: Belief, error_of: Callable[[Any], Any], variance: Any, here: Any, state_type: Any, gate: float | None = None
+    belief: Belief,
+    error_of: Callable[[Any], Any],
+    variance: Any,
+    here: Any,
+    state_type: Any,
+    gate: Any = None,
+    fall: float = 1.0,
 ) -> Belief:
     """The belief after one measurement with this noise variance, where it is `here`.
 
-    `error_of(state)`: the measurement less its prediction; finite wherever the belief is. `gate`: an error of more than this
-    many of its predicted standard deviations has a weight reduced in proportion (Huber), None: all have the same weight.
+    `error_of(state)`: the measurement less its prediction; finite wherever the belief is. `gate`: an error e of more than this
+    many of its predicted standard deviations has the weight `(gate / |e|)^fall`, None: all have the same weight. With a
+    `fall` of 1 (Huber) the correction stays the same beyond the gate, with more it falls.
     """
     error, slope = jax.value_and_grad(lambda vector: error_of(state_type(*vector)))(belief.mean)
     found = Innovation(error, slope @ belief.covariance @ slope + variance, -slope)
     trust = jnp.ones_like(error)
     if gate is not None:
-        trust = jax.lax.rsqrt(jnp.maximum(jnp.square(error) / (gate * gate * found.variance), 1.0))
+        trust = jnp.maximum(jnp.square(error) / (gate * gate * found.variance), 1.0) ** (-0.5 * fall)
     return update(belief, found, jnp.where(here, trust, 0.0))
 
 

@@ -14,7 +14,7 @@ from jax import lax
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh.numerics import barriers_hold, on_cpu
-from jaxveh.statespace import RK4
+from jaxveh.statespace import RK4, kit
 
 
 def fixed_steps(
@@ -54,7 +54,7 @@ def fixed_steps(
     for name, count in (("rows", rows), ("steps_a_row", steps_a_row), ("block", 1 if block is None else block)):
         if count < 1:
             raise InputError(f"{name} = {count}: must be at least 1.")
-    solver = RK4() if solver is None else solver
+    solver = RK4() if solver is None else kit.in_both_modes(solver)
     leaves = jax.tree.leaves(x0)
     begin = jnp.asarray(start, jnp.result_type(*leaves))
 

@@ -19,7 +19,7 @@ from jaxveh._core.traced import trace_once
 from jaxveh.simulation.driven import Driven, dtype_of
 from jaxveh.simulation.events import Event
 from jaxveh.simulation.stiffness import SolverChoice
-from jaxveh.statespace import RK4, Heun, RolledRK4
+from jaxveh.statespace import kit
 
 ADAPTIVE_STEPS_A_ROW = 64
 """Most steps of a solver with its own step size, as a multiple of the number of equal steps of the greatest length."""
@@ -99,11 +99,11 @@ def solve(
     _check_distinct("steps", grid.steps, dtype)
     rows, steps = jnp.asarray(grid.rows, dtype), jnp.asarray(grid.steps, dtype)
     meter = diffrax.NoProgressMeter() if meter is None else meter
-    plain = choice.controller is None and until is None and adjoint is None and isinstance(choice.solver, SCANNED)
+    plain = choice.controller is None and until is None and adjoint is None and isinstance(choice.solver, kit.EXPLICIT)
     each = grid.steps_a_row if plain else None
     if each is not None:
         meter = meter if len(steps) > TOLD_FROM else diffrax.NoProgressMeter()
-        return _scan(driven, start, rows, steps, choice.solver, each, meter)
+        return _scan(driven, start, rows, steps, kit.in_both_modes(choice.solver), each, meter)
     adjoint = diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint
     return _solve(driven, start, rows, steps, choice.solver, choice.controller, until, adjoint, meter)
 
@@ -124,10 +124,6 @@ def _rates(t, x, driven: Driven):
     return trace_once(Driven.derivatives, driven, t, x)
 
 
-SCANNED = (RK4, RolledRK4, Heun)
-"""Solvers whose equal steps run as a `lax.scan`: explicit ones without a memory."""
-
-
 @eqx.filter_jit
 def _scan(driven: Driven, start, rows, steps, solver, each: int, meter) -> Solution:
     """The same steps as in `_solve`, without the parts of `diffeqsolve` that they do not need.
@@ -137,23 +133,26 @@ def _scan(driven: Driven, start, rows, steps, solver, each: int, meter) -> Solut
     term, count = diffrax.ODETerm(_rates), len(rows) - 1
     y0 = driven.start(rows[0], rows.dtype, **start)
 
-    def one_step(x, between):
-        x, _, _, _, _ = solver.step(term, *between, x, driven, None, made_jump=False)
-        return x, None
+    def one_step(carry, between):
+        x, memory = carry
+        x, _, _, memory, _ = solver.step(term, *between, x, driven, memory, made_jump=jnp.asarray(False))
+        return (x, memory), None
 
     @functools.partial(jax.checkpoint, prevent_cse=False)
-    def steps_of_a_row(x, between):
-        return jax.lax.scan(one_step, x, between)[0]
+    def steps_of_a_row(carry, between):
+        return jax.lax.scan(one_step, carry, between)[0]
 
     def row(carry, given):
-        x, told = carry
+        stepped, told = carry
         between, share = given
-        x = steps_of_a_row(x, between)
-        return (x, meter.step(told, share)), x
+        stepped = steps_of_a_row(stepped, between)
+        return (stepped, meter.step(told, share)), stepped[0]
 
     between = steps[:-1].reshape(count, each), steps[1:].reshape(count, each)
     share = jnp.arange(1, count + 1, dtype=jnp.int32) / jnp.asarray(count, jnp.int32)
-    (_, told), later = jax.lax.scan(row, (y0, meter.init()), (between, share))
+    # Of a solver that keeps its last slopes for the next step; None of the others.
+    memory = solver.init(term, steps[0], steps[1], y0, driven)
+    (_, told), later = jax.lax.scan(row, ((y0, memory), meter.init()), (between, share))
     meter.close(told)
     x = jax.tree.map(lambda first, rest: jnp.concatenate([jnp.asarray(first)[None], rest]), y0, later)
     return _solution(driven, rows, x, rows[-1], jnp.asarray(False), jnp.ones(len(rows), bool), jnp.asarray(True))

@@ -32,9 +32,11 @@ from jaxveh.statespace.independent import whiten
 from jaxveh.statespace.measurements import by_channel, input_result, presence
 from jaxveh.statespace.model import scalar_row
 from jaxveh.statespace.noise import LOG_2PI
+from jaxveh.statespace.solvers import EXPLICIT, in_both_modes
 
 __all__ = [
     "DISTURBANCE_PREFIX",
+    "EXPLICIT",
     "KEPT",
     "LOG_2PI",
     "SHOWN",
@@ -50,6 +52,7 @@ __all__ = [
     "check_told",
     "draw_rows",
     "gradients_of",
+    "in_both_modes",
     "in_form_for_batches",
     "innermost",
     "input_result",

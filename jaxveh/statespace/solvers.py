@@ -113,6 +113,21 @@ class Heun(AbstractOneStep):
         return numerics.fence(jax.tree.map(lambda y, a, b: y + 0.5 * (a + b), y0, k1, k2))
 
 
+EXPLICIT = (RK4, RolledRK4, Heun, diffrax.AbstractERK, diffrax.Euler)
+"""Explicit solvers, the package's own and those of diffrax."""
+
+
+def in_both_modes(solver: diffrax.AbstractSolver) -> diffrax.AbstractSolver:
+    """The solver, whose steps can be differentiated in forward and in reverse mode.
+
+    The stages of diffrax's Runge-Kutta methods are a loop of one of three kinds (`scan_kind`); unless the solver was made with
+    another, it is one for reverse mode alone.
+    """
+    if not isinstance(solver, diffrax.AbstractRungeKutta) or solver.scan_kind is not None:
+        return solver
+    return eqx.tree_at(lambda one: one.scan_kind, solver, "bounded", is_leaf=lambda leaf: leaf is None)
+
+
 class Propagate(eqx.Module):
     """A continuous model as a filter's `transition(system, t0, t1, x, u)`: explicit fixed steps of a diffrax solver.
 
@@ -126,12 +141,12 @@ class Propagate(eqx.Module):
 
     def __call__(self, system, t0, t1, x, u):
         term = diffrax.ODETerm(lambda t, y, args: trace_once(_rates, self.derivatives, system, t, y, args))
-        dt = (t1 - t0) / self.steps
+        dt, solver = (t1 - t0) / self.steps, in_both_modes(self.solver)
         state = None
         for i in range(self.steps):
             start, end = t0 + i * dt, (t1 if i == self.steps - 1 else t0 + (i + 1) * dt)
-            state = self.solver.init(term, start, end, x, u) if i == 0 else state
-            x, _, _, state, _ = self.solver.step(term, start, end, x, u, state, made_jump=jnp.array(False))
+            state = solver.init(term, start, end, x, u) if i == 0 else state
+            x, _, _, state, _ = solver.step(term, start, end, x, u, state, made_jump=jnp.array(False))
         return x
 
 

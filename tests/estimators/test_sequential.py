@@ -1,5 +1,7 @@
 """The small extended Kalman filter: its update against the information form, trust, and float32."""
 
+from collections import namedtuple
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -27,6 +29,25 @@ def test_an_update_is_that_of_a_sensor_whose_noise_is_larger_by_the_trust(seed, 
     covariance = np.linalg.inv(np.linalg.inv(belief.covariance) + told * np.outer(h, h))
     np.testing.assert_allclose(found.covariance, covariance, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(found.mean, belief.mean + covariance @ h * told * 0.7, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("gate", [0.5, 2.0])
+@pytest.mark.parametrize("fall", [1.0, 4.0])
+@pytest.mark.parametrize("error", [0.3, -1.0, 5.0, -40.0])
+def test_beyond_a_gate_a_correction_stays_the_same_or_falls(gate, fall, error):
+    one = namedtuple("One", ["x", "y"])
+    belief = belief_of(3, 2)
+    variance = belief.covariance[0, 0] + 0.2
+    value = belief.mean[0] + error * np.sqrt(variance)
+    ask = lambda gate, **more: sequential.correct(
+        belief, lambda state: value - state.x, jnp.asarray(0.2), True, one, gate, **more
+    )
+    plain, gated = ask(None), ask(gate, fall=fall)
+    weight = 1.0 if abs(error) < gate else (gate / abs(error)) ** fall
+    moved, whole = np.asarray(gated.mean - belief.mean), np.asarray(plain.mean - belief.mean)
+    np.testing.assert_allclose(moved, weight * whole, rtol=1e-9)
+    loss, most = belief.covariance - gated.covariance, belief.covariance - plain.covariance
+    np.testing.assert_allclose(loss, weight * most, rtol=1e-9, atol=1e-12)
 
 
 def test_in_float32_ten_thousand_measurements_leave_a_covariance():

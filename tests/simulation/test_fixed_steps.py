@@ -110,7 +110,7 @@ def test_blocks_need_one_number_a_run():
             simulation.fixed_steps(rates, wrong, 4.0, rows=2, step=0.1, block=2)
 
 
-@pytest.mark.parametrize("solver", [statespace.RK4(), statespace.RolledRK4()])
+@pytest.mark.parametrize("solver", [statespace.RK4(), statespace.RolledRK4(), diffrax.Tsit5()])
 def test_gradients_are_those_of_the_closed_form(solver):
     place = lambda k: simulation.fixed_steps(rates, START, k, rows=5, step=0.01, steps_a_row=20, solver=solver).place[
         -1

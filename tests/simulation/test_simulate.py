@@ -243,3 +243,37 @@ def test_equal_steps_are_diffrax_s_own_and_both_modes_differentiate():
     np.testing.assert_allclose(value, through, rtol=1e-12)
     np.testing.assert_allclose(forward, reverse, rtol=1e-9)
     np.testing.assert_allclose(forward, (with_slopes(mass + 1.0)[0] - with_slopes(mass - 1.0)[0]) / 2.0, rtol=1e-5)
+
+
+EXPLICIT = [
+    one
+    for one in vars(diffrax).values()
+    if isinstance(one, type) and issubclass(one, diffrax.AbstractERK | diffrax.Euler) and one is not diffrax.AbstractERK
+]
+SOME = (diffrax.Euler, diffrax.Tsit5)
+"""One without a memory, one that keeps its last slopes."""
+
+
+@pytest.mark.parametrize("kind", [pytest.param(k, marks=() if k in SOME else pytest.mark.full) for k in EXPLICIT])
+def test_equal_steps_of_every_explicit_solver_of_diffrax_are_those_of_diffeqsolve(kind):
+    """And differentiate in both modes; `diffeqsolve` does so in reverse mode, with its default adjoint."""
+
+    def last(mass, adjoint=None):
+        car = eqx.tree_at(lambda c: c.mass, vehicles.linear_single_track(CAR()), mass)
+        steer = manoeuvres.step_steer(25.0, 0.05, start=0.1, duration=0.5)
+        drive = simulate(car, steer, solver=kind(), dt=0.05, max_step=0.004, throw=False, adjoint=adjoint)
+        return drive["true.yaw_rate"]
+
+    mass = jnp.asarray(1420.0)
+    with_slopes = jax.jit(
+        lambda mass: (*jax.jvp(last, (mass,), (jnp.ones(()),)), jax.grad(lambda mass: last(mass)[-1])(mass))
+    )
+    value, slope, against = with_slopes(mass)
+    np.testing.assert_allclose(value, jax.jit(lambda m: last(m, diffrax.DirectAdjoint()))(mass), rtol=1e-11, atol=1e-14)
+    differences = (with_slopes(mass + 1.0)[0] - with_slopes(mass - 1.0)[0]) / 2.0
+    np.testing.assert_allclose(slope, differences, rtol=1e-5, atol=1e-12)
+    np.testing.assert_allclose(against, slope[-1], rtol=1e-10)
+
+
+def test_the_explicit_solvers_are_found():
+    assert len(EXPLICIT) >= 8 and set(SOME) < set(EXPLICIT)
