@@ -15,13 +15,15 @@ from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_fro
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
+from jaxveh.estimators.steer_agreement import AgreementMemory, SteerAgreement, agreement_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
 DEGREE = math.pi / 180.0
 
 NEEDS = (*LATERAL, Need("roll_rate", "rad/s", optional=True), Need("course", "rad", optional=True))
-"""The channels of a stability control; a gyroscope about the x axis and satellite navigation where available."""
+"""The channels of a stability control; a gyroscope about the x axis and satellite navigation where available. With a
+`SteerAgreement` also those of the steer."""
 
 STATES = (
     "v_y", "yaw", "bank", "bank_rate", "body_roll", "body_roll_rate", "a_y_bias", "yaw_rate_bias", "roll_rate_bias",
@@ -49,10 +51,11 @@ MORE = ("v_y", "rear_scale", "roll_scale", "a_y_bias", "yaw_rate_bias", "roll_ra
 
 
 class Memory(NamedTuple):
-    """The last measurements, and the belief."""
+    """The last measurements, the belief, and how far the car lately was from a steady turn (None: not checked)."""
 
     motion: Any
     belief: Belief
+    agreement: AgreementMemory | None
 
 
 class Leaning(AbstractMethod):
@@ -68,7 +71,8 @@ class Leaning(AbstractMethod):
     uphill. None of them can distinguish a constant bank from the accelerometer's offset. The two are separated only because
     roads bank to either side about level, while the offset stays. So the standard deviation of the bank falls slowly, and an
     offset from earlier drives helps (`a_y_offset`). An axle that slides has a slip angle that its force does not give, on ice
-    at any acceleration: the further off it is, the less it counts (`slip_gate`), and the kinematics hold alone.
+    at any acceleration: the further off it is, the less it counts (`slip_gate`), also where steer and yaw rate do not agree
+    (`steering`, None: not checked), and then the kinematics hold alone. They take a slide that grows slowly for a bank.
 
     **Parameters**: `rear_axle_to_cg` (m); `rear_compliance` (rad/(m/s^2)): the rear axle's slip angle per lateral
     acceleration, `m l_f / (l C_r)`; `roll_gradient` (rad/(m/s^2)), `roll_frequency` (Hz), `roll_damping` (-) of the body over
@@ -100,16 +104,17 @@ class Leaning(AbstractMethod):
     a_y_offset_spread: jax.Array = positive("m/s^2", default=0.06)
     gyro_offset_spread: jax.Array = positive("rad/s", default=0.12 * DEGREE)
     scale_spread: jax.Array = positive("-", default=0.12)
+    steering: SteerAgreement | None = None
 
     def __check_init__(self):
         check_parameters(self)
 
     @property
     def needs(self):
-        return NEEDS
+        return NEEDS if self.steering is None else (*NEEDS, *self.steering.needs)
 
     def first(self, t, values):
-        memory, heard = self.motion.first(t, values)
+        motion, heard = self.motion.first(t, values)
         gyro, scale = self.gyro_offset_spread, self.scale_spread
         stds = {
             "v_y": 0.5, "yaw": 3.0, "bank": self.bank_spread, "bank_rate": 0.01, "body_roll": 0.02, "body_roll_rate": 0.05,
@@ -117,12 +122,14 @@ class Leaning(AbstractMethod):
             "rear_scale": scale, "roll_scale": scale,
         }  # fmt: skip
         belief = belief_of(State, {"a_y_bias": self.a_y_offset}, stds, t)
-        return self._answer(memory, self._measured(belief, heard), heard)
+        agreement = None if self.steering is None else self.steering.start(t)
+        return self._answer(Memory(motion, self._measured(belief, heard, agreement), agreement), heard)
 
     def next(self, memory, t, values):
         motion, heard = self.motion.next(memory.motion, t, values)
-        belief = self._ahead(memory.belief, heard)
-        return self._answer(motion, self._measured(belief, heard), heard)
+        agreement = None if self.steering is None else self.steering.next(memory.agreement, values, heard)
+        belief = self._measured(self._ahead(memory.belief, heard), heard, agreement)
+        return self._answer(Memory(motion, belief, agreement), heard)
 
     def _ahead(self, belief: Belief, heard) -> Belief:
         dt = heard["dt"]
@@ -164,7 +171,7 @@ class Leaning(AbstractMethod):
             body_roll_rate=rate,
         )
 
-    def _measured(self, belief: Belief, heard) -> Belief:
+    def _measured(self, belief: Belief, heard, agreement: AgreementMemory | None) -> Belief:
         v_x, dt = heard["v_x"], heard["dt"]
         fast = away_from_zero(v_x)
 
@@ -195,13 +202,17 @@ class Leaning(AbstractMethod):
         satellites, gyroscope = ~jnp.isnan(heard["course"]), ~jnp.isnan(heard["roll_rate"])
         # A correlated error counts once per correlation time, however many rows there are; in hard turns tyres are not linear.
         lasting = jnp.square(self.slip_error) * 2.0 * self.slip_error_time / jnp.maximum(dt, 1e-3)
-        slip = lasting * (1.0 + jnp.square(jnp.square(heard["a_y"] / LINEAR)))
+        fourth = lambda x: jnp.square(jnp.square(x))
+        slip = lasting * (1.0 + fourth(heard["a_y"] / LINEAR))
+        if agreement is not None:
+            slip = slip + lasting * fourth(agreement.doubt)
         there = heard["silence"] < SILENCE
         belief = correct(belief, rear, slip, there, State, self.slip_gate, FALL)
         belief = correct(belief, course, jnp.square(self.across / fast), satellites & (v_x > 1.0), State, 3.0)
         return correct(belief, rolling, jnp.square(self.roll_rate_noise), gyroscope, State)
 
-    def _answer(self, motion, belief, heard):
+    def _answer(self, memory: Memory, heard):
+        belief = memory.belief
         x = State(*belief.mean)
         forgets = self._passing(heard["v_x"]) / self.bank_length
         wide = lambda *names: spread_of(belief, dict.fromkeys(names, 1.0), State)
@@ -217,7 +228,7 @@ class Leaning(AbstractMethod):
         there = heard["silence"] < SILENCE
         widest = {"bank": WIDEST, "roll": WIDEST, "body_roll": WIDEST, "roll_rate": 6.0 * WIDEST}
         known = {name: there & (stds[name] < widest.get(name, jnp.inf)) for name in said}
-        return Memory(motion, belief), answer(said, stds, known)
+        return memory, answer(said, stds, known)
 
 
 def leaning_filter(car: CarSpecification, who: str, **options: Any) -> Leaning:
@@ -231,5 +242,5 @@ def leaning_filter(car: CarSpecification, who: str, **options: Any) -> Leaning:
         rear_compliance=car.mass * car.front_axle_to_cg / (car.wheelbase * stiffness),
         roll_gradient=number_of(car, "roll_gradient", who, "rad/(m/s^2)"),
         **{name: value for name, value in told.items() if value is not None},
-        **options,
+        **{"steering": agreement_of(car, who), **options},
     )

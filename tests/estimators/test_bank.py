@@ -3,6 +3,8 @@
 import dataclasses
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from banked_drives import DEGREE, file_of, follow_all
@@ -10,8 +12,13 @@ from method_logs import CAR
 from steady_logs import G, banked_circle
 from winding_roads import SCORED, heard_of
 
-from jaxveh import InputError
+from jaxveh import InputError, manoeuvres, roads
 from jaxveh.estimators import bank
+from jaxveh.estimators.bank.tseng import STEERING
+from jaxveh.estimators.body_motion import LATERAL, BodyMotion
+from jaxveh.estimators.steer_agreement import agreement_of
+from jaxveh.simulation import simulate
+from jaxveh.vehicles import kit, named_car, specification_of
 
 SIMPLE = ("disturbance_observer", "unknown_input", "tseng")
 
@@ -75,6 +82,80 @@ def test_a_file_without_what_tells_roll_from_bank_is_refused():
         method = "tseng" if key == "steering_ratio" else "filter"
         with pytest.raises(InputError, match=f"bank: the car's file has no {key} \\({unit}\\)"):
             bank.METHODS[method].make(dataclasses.replace(CAR, **{key: None}))
+
+
+def test_an_axle_that_slides_is_not_a_bank():
+    """Level roads, dry and slippery, without satellites: the slip angle of a sliding axle is not that of its force, and taken
+    as that it is a bank of 4 to 10 degrees."""
+    cars = ("compact_car", "sedan", "van")
+    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[named_car(car, "two-track-3dof") for car in cars])
+
+    def drive(car, friction):
+        driver = manoeuvres.random_steering(25.0, 0.02, jax.random.key(3), duration=20.0)
+        found = simulate(
+            car, driver, road=roads.Level(friction=friction), max_step=0.005, solver="explicit", throw=False
+        )
+        return {name: found[f"true.{name}"] for name in ("a_y", "yaw_rate", "v_x", "sideslip", "steer")}
+
+    both = jax.vmap(jax.vmap(drive, (None, 0)), (0, None))
+    found = jax.tree.map(np.asarray, jax.jit(both)(stacked, jnp.asarray([1.0, 0.3])))
+    cases = [(car, {k: v[i, j] for k, v in found.items()}) for i, car in enumerate(cars) for j in range(2)]
+    # A plane car does not roll.
+    rigid = lambda car: dataclasses.replace(specification_of(kit.CARS[car]()), roll_gradient=1e-5)
+    said = follow_all(lambda car: bank.METHODS["filter"].make(rigid(car)), cases, 0.01 * np.arange(2001))
+    slid = np.abs(found["sideslip"]).max(axis=2)
+    assert (slid[:, 0] < 0.05).all() and (slid[:, 1] > 0.12).all()
+    # Until it spins, from the time at which the offset of the accelerometer has settled.
+    held = np.cumprod(np.abs(found["sideslip"]) < 0.35, axis=2) > 0
+    held[:, :, :300] = False
+    known = held & said.known.bank.reshape(held.shape)
+    errors = np.sqrt(np.mean(said.mean.bank.reshape(held.shape) ** 2, axis=2, where=known)) / DEGREE
+    assert (errors[:, 0] < 0.7).all() and (errors[:, 1] < 2.0).all(), errors
+    assert (known.sum(axis=2) > 0.5 * held.sum(axis=2)).all()
+
+
+def agreements(log, **changes):
+    """How far each row of a log is from a steady turn, for a file with these changes."""
+    check = agreement_of(dataclasses.replace(CAR, **changes), "test")
+    motion = BodyMotion()
+    values = {name: jnp.asarray(log[name]) for name in log.names}
+    values |= {need.channel: values.get(need.channel, jnp.full(len(log), jnp.nan)) for need in (*LATERAL, *check.needs)}
+
+    def step(memory, row):
+        t, values = row
+        completed, heard = motion.next(memory[0], t, values)
+        agreement = check.next(memory[1], values, heard)
+        return (completed, agreement), agreement.doubt
+
+    first = {name: value[0] for name, value in values.items()}
+    start = motion.first(jnp.asarray(log.time[0]), first)[0], check.start(jnp.asarray(log.time[0]))
+    return np.asarray(jax.lax.scan(step, start, (jnp.asarray(log.time), values))[1])
+
+
+def test_steer_agrees_with_a_steady_turn_on_any_bank_and_not_with_a_slide():
+    log = banked_circle((*LATERAL, STEERING))[0]
+    road = log.replace(steer=np.asarray(log["steering_wheel"]) / CAR.steering_ratio).without("steering_wheel")
+    for one, changes in (
+        (log, {}), (road, {}), (road, {"steering_ratio": None}),
+        (road.replace(steer=road["steer"] + 0.05), {"steer_offset": 0.05}),
+    ):  # fmt: skip
+        # A tenth of the usual disagreement: the roll of the car's body is that of its file.
+        assert agreements(one, **changes)[-1] < 0.1
+    slides = agreements(road.replace(steer=road["steer"] + 0.03))
+    np.testing.assert_allclose(slides[-1], 10.0, rtol=0.02)
+    # Without a steer nothing is known.
+    assert (agreements(road.without("steer")) == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    "changes", [{"steering_ratio": None}, {"steering": "four-wheel", "rear_steer_ratio": 0.1}]
+)
+def test_a_file_that_tells_too_little_of_the_steer_leaves_it_out(changes):
+    method = bank.METHODS["filter"].make(dataclasses.replace(CAR, **changes))
+    read = {need.channel for need in method.needs}
+    assert ("steer" in read) == ("steering_ratio" in changes) and "steering_wheel" not in read
+    found = bank.estimate(method, banked_circle(method.needs)[0])
+    assert found.known.bank[-1]
 
 
 @pytest.mark.full

@@ -12,7 +12,7 @@ from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators.body_motion import SILENCE, away_from_zero, hold, number_of
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.leaning import NEEDS, Leaning, leaning_filter
+from jaxveh.estimators.leaning import Leaning, leaning_filter
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.sequential import Belief, belief_of, correct
 from jaxveh.io import CarSpecification
@@ -106,7 +106,7 @@ class Learner(AbstractMethod):
 
     @property
     def needs(self):
-        return (*NEEDS, STEERING)
+        return (*self.leaning.needs, STEERING)
 
     def first(self, t, values):
         leaning, said = self.leaning.first(t, values)
@@ -253,7 +253,8 @@ def learner_of(car: CarSpecification, who: str) -> Learner:
     """Makes `Learner` from a car's file. **Raises** `InputError` for a file without stiffnesses, `steering_ratio` or
     `roll_gradient`."""
     return Learner(
-        leaning_filter(car, who),
+        # What the steer says is learned here, and not yet known.
+        leaning_filter(car, who, steering=None),
         car.mass,
         car.yaw_inertia,
         car.front_axle_to_cg,

@@ -1,0 +1,89 @@
+"""Whether steer, yaw rate and lateral acceleration agree as they do while the tyres are linear."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.estimators.body_motion import away_from_zero, hold
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.lateral import Lateral, lateral_of
+from jaxveh.io import CarSpecification
+
+STEER, STEERING_WHEEL = Need("steer", "rad", optional=True), Need("steering_wheel", "rad", optional=True)
+
+FRONT = (None, "front", "ackermann")
+"""Kinds of steering whose rear wheels point ahead."""
+
+
+class AgreementMemory(NamedTuple):
+    """The steer (rad, NaN before its first measurement), the low-passed disagreement (rad), and how much it lately was (-)."""
+
+    steer: Any
+    slow: Any
+    doubt: Any
+
+
+class SteerAgreement(eqx.Module):
+    """How far a car is from the steady turn of linear tyres, in which `l r / v_x = steer - understeer f_y` (H. E. Tseng, Vehicle
+    System Dynamics 36, 2001), whatever the bank: an axle that slides has another slip angle than that of its force.
+
+    The disagreement through a low-pass of `time` (s), over `usual` (rad). What it was fades within `staying` (s): an axle that
+    grips again needs a moment. A car that slides on both axles by the same angle is not noticed.
+
+    `ratio` (-): of the steering, None: the log must have the steer of the road wheels. `offset` (rad): the value of that
+    channel when the car runs straight.
+    """
+
+    car: Lateral
+    ratio: jax.Array | None = positive("-", default=None)
+    offset: jax.Array = parameter("rad", scale=0.01, default=0.0)
+    usual: jax.Array = positive("rad", default=0.003)
+    time: jax.Array = positive("s", default=0.15)
+    staying: jax.Array = positive("s", default=1.0)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    @property
+    def needs(self) -> tuple[Need, ...]:
+        """The channels that are read."""
+        return (STEER,) if self.ratio is None else (STEER, STEERING_WHEEL)
+
+    def start(self, t: Any) -> AgreementMemory:
+        """The memory before the first row: no disagreement."""
+        zero = jnp.zeros_like(t)
+        return AgreementMemory(zero + jnp.nan, zero, zero)
+
+    def next(self, last: AgreementMemory, values: dict[str, Any], heard: dict[str, Any]) -> AgreementMemory:
+        """The memory after a row with these channels, completed as `heard` (see `BodyMotion`)."""
+        dt, v_x = heard["dt"], heard["v_x"]
+        steer = hold(self._steer(values), last.steer)
+        # Without this replacement the derivative would be NaN even where the result is not used.
+        known = jnp.where(jnp.isnan(steer), 0.0, steer)
+        turned = self.car.wheelbase * heard["yaw_rate"] / away_from_zero(v_x)
+        off = known - turned - self.car.understeer * self.car.plane_force(heard["a_y"])
+        slow = last.slow + dt / (self.time + dt) * (jnp.where(jnp.isnan(steer), 0.0, off) - last.slow)
+        return AgreementMemory(
+            steer, slow, jnp.maximum(jnp.abs(slow) / self.usual, last.doubt * jnp.exp(-dt / self.staying))
+        )
+
+    def _steer(self, values):
+        steer = values["steer"] - self.offset
+        if self.ratio is None:
+            return steer
+        wheel = values["steering_wheel"]
+        turned = jnp.where(jnp.isnan(wheel), jnp.nan, jnp.where(jnp.isnan(wheel), 0.0, wheel) / self.ratio)
+        return jnp.where(jnp.isnan(steer), turned, steer)
+
+
+def agreement_of(car: CarSpecification, who: str) -> SteerAgreement | None:
+    """Makes `SteerAgreement` from a car's file; None for a file without the front axle's stiffness, or with steered rear wheels.
+    **Raises** as `lateral_of`."""
+    if car.front_cornering_stiffness is None or car.steering not in FRONT:
+        return None
+    return SteerAgreement(lateral_of(car, who), ratio=car.steering_ratio, offset=car.steer_offset or 0.0)
