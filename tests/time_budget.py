@@ -9,6 +9,10 @@ left to `-m full` too. A case that alone takes much longer than its function's o
 the others are not. A function that is not on record runs whole, so that a new one is never left out.
 
 `JAXVEH_SECONDS=1 python -m pytest` records them again.
+
+`JAXVEH_HALF=0` or `1` leaves half of what is `thorough` or of the `studies` to `-m full`. `.ci/run` takes the half that the
+commit decides, so that two changes in a row run both, and the same commit always the same: all of them would take it 30 minutes.
+Without it both halves run.
 """
 
 import json
@@ -31,6 +35,9 @@ COLOURS = 6
 """Of the cases of a `product` one in so many runs by default."""
 
 RECORD = Path(__file__).parent / "recorded" / "seconds.json"
+
+ALWAYS = ("site/test_notebooks.py", "test_a_page_runs_from_top_to_bottom[README.md]", "[jaxveh estimate drive.csv")
+"""Parts of the names of those of both halves: what a user meets first."""
 
 LEFT_OUT = ("full", "thorough", "peers", "studies", "site")
 """Marks of tests that do not run by default whatever they take. What no other test executes is marked `thorough` by hand: it
@@ -92,6 +99,16 @@ def mark_long(functions):
         spent += took
         for item in members:
             item.add_marker(pytest.mark.thorough if spent <= LONG_BUDGET else pytest.mark.full)
+
+
+def keep_half(items, half):
+    """Mark as `full` those long tests that are not of this half, 0 or 1: of pages each by itself, of other files each function
+    with all its cases, which share what they compile. Whatever stands beside a test, it is of the same half."""
+    for item in items:
+        long = item.get_closest_marker("thorough") or item.get_closest_marker("studies")
+        name = item.nodeid if "/site/" in item.nodeid else function_of(item.nodeid)
+        if long and not any(part in item.nodeid for part in ALWAYS) and zlib.crc32(name.encode()) % 2 != half:
+            item.add_marker(pytest.mark.full)
 
 
 def number_kept(each, most):
