@@ -147,9 +147,7 @@ def test_steer_agrees_with_a_steady_turn_on_any_bank_and_not_with_a_slide():
     assert (agreements(road.without("steer")) == 0.0).all()
 
 
-@pytest.mark.parametrize(
-    "changes", [{"steering_ratio": None}, {"steering": "four-wheel", "rear_steer_ratio": 0.1}]
-)
+@pytest.mark.parametrize("changes", [{"steering_ratio": None}, {"steering": "four-wheel", "rear_steer_ratio": 0.1}])
 def test_a_file_that_tells_too_little_of_the_steer_leaves_it_out(changes):
     method = bank.METHODS["filter"].make(dataclasses.replace(CAR, **changes))
     read = {need.channel for need in method.needs}
