@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators.body_motion import away_from_zero, hold
 from jaxveh.estimators.contract import Need
@@ -18,6 +19,9 @@ STEER, STEERING_WHEEL = Need("steer", "rad", optional=True), Need("steering_whee
 
 FRONT = (None, "front", "ackermann")
 """Kinds of steering whose rear wheels point ahead."""
+
+PARKING, DRIVING = 4.0, 8.0
+"""m/s: below the first speed steer and yaw rate disagree by the geometry of large angles, beyond the second by slip."""
 
 
 class AgreementMemory(NamedTuple):
@@ -33,7 +37,8 @@ class SteerAgreement(eqx.Module):
     System Dynamics 36, 2001), whatever the bank: an axle that slides has another slip angle than that of its force.
 
     The disagreement through a low-pass of `time` (s), over `usual` (rad). What it was fades within `staying` (s): an axle that
-    grips again needs a moment. A car that slides on both axles by the same angle is not noticed.
+    grips again needs a moment. At the speeds of parking nothing is said. A car that slides on both axles by the same angle is
+    not noticed.
 
     `ratio` (-): of the steering, None: the log must have the steer of the road wheels. `offset` (rad): the value of that
     channel when the car runs straight.
@@ -65,9 +70,14 @@ class SteerAgreement(eqx.Module):
         steer = hold(self._steer(values), last.steer)
         # Without this replacement the derivative would be NaN even where the result is not used.
         known = jnp.where(jnp.isnan(steer), 0.0, steer)
-        turned = self.car.wheelbase * heard["yaw_rate"] / away_from_zero(v_x)
-        off = known - turned - self.car.understeer * self.car.plane_force(heard["a_y"])
-        slow = last.slow + dt / (self.time + dt) * (jnp.where(jnp.isnan(steer), 0.0, off) - last.slow)
+        # Backwards the yaw rate turns the other way, and the slip angles too.
+        fast = away_from_zero(v_x)
+        turned = self.car.wheelbase * heard["yaw_rate"] / fast + self.car.understeer * self.car.plane_force(
+            heard["a_y"]
+        )
+        off = known - (v_x / fast) * turned
+        told = jnp.where(jnp.isnan(steer), 0.0, numerics.smooth_step((jnp.abs(v_x) - PARKING) / (DRIVING - PARKING)))
+        slow = last.slow + dt / (self.time + dt) * (told * off - last.slow)
         return AgreementMemory(
             steer, slow, jnp.maximum(jnp.abs(slow) / self.usual, last.doubt * jnp.exp(-dt / self.staying))
         )

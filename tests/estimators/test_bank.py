@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from banked_drives import DEGREE, file_of, follow_all
 from method_logs import CAR
-from steady_logs import G, banked_circle
+from steady_logs import WHEELS, G, banked_circle
 from winding_roads import SCORED, heard_of
 
 from jaxveh import InputError, manoeuvres, roads
@@ -143,8 +143,23 @@ def test_steer_agrees_with_a_steady_turn_on_any_bank_and_not_with_a_slide():
         assert agreements(one, **changes)[-1] < 0.1
     slides = agreements(road.replace(steer=road["steer"] + 0.03))
     np.testing.assert_allclose(slides[-1], 10.0, rtol=0.02)
+    # Nor does it forwards and backwards at the speed of parking, where a steer of half a radian is geometry.
+    slow = road.replace(steer=np.full(len(road), 0.5), **{name: np.full(len(road), 3.0) for name in WHEELS})
+    for parking in (slow, slow.replace(**{name: -slow[name] for name in WHEELS})):
+        assert (agreements(parking) == 0.0).all()
     # Without a steer nothing is known.
     assert (agreements(road.without("steer")) == 0.0).all()
+
+
+def test_a_car_that_stands_with_its_wheels_turned_still_feels_the_bank():
+    method = bank.METHODS["filter"].make(CAR)
+    log = banked_circle(method.needs, yaw_rate=0.0, bank=0.03, rows=2000)[0].replace(
+        **dict.fromkeys(WHEELS, np.zeros(2000))
+    )
+    turned = log.replace(steering_wheel=np.full(len(log), 6.0))
+    found, ahead = (bank.estimate(method, one) for one in (turned, log.replace(steering_wheel=np.zeros(len(log)))))
+    np.testing.assert_allclose(found["bank"], ahead["bank"], atol=1e-12)
+    assert abs(found.mean.v_y[-1]) < 0.05 and found.known.bank[-1]
 
 
 @pytest.mark.parametrize("changes", [{"steering_ratio": None}, {"steering": "four-wheel", "rear_steer_ratio": 0.1}])
