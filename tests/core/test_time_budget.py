@@ -52,23 +52,21 @@ class Long(Item):
         return name in ("thorough", "studies") or None
 
 
-def test_two_halves_are_all_long_tests_and_share_only_what_a_user_meets_first():
-    names = [f"tests/a.py::f{k}[{case}]" for k in range(40) for case in range(3)]
-    names += [f"tests/site/test_pages_run.py::page[{k}.md]" for k in range(40)] + [
-        "tests/site/test_pages_run.py::test_a_page_runs_from_top_to_bottom[README.md]"
-    ]
-    halves = []
-    for half in (0, 1):
-        items = [Long(name) for name in names] + [Item("tests/a.py::quick")]
-        time_budget.keep_half(items, half)
-        assert items[-1].marks == []
-        halves.append({item.nodeid for item in items[:-1] if not item.marks})
-    assert halves[0] | halves[1] == set(names)
-    assert halves[0] & halves[1] == {names[-1]}
-    assert all(50 < len(half) < 110 for half in halves)
-    # All cases of a function are of one half.
-    functions = [{function_of(name) for name in half if "/site/" not in name} for half in halves]
-    assert not functions[0] & functions[1]
+def test_three_thirds_are_all_long_tests_and_share_only_what_a_user_meets_first():
+    names = [f"tests/a.py::f{k}[{case}]" for k in range(60) for case in range(3)]
+    names += [f"tests/site/test_pages_run.py::page[{k}.md]" for k in range(60)]
+    first = "tests/site/test_pages_run.py::test_a_page_runs_from_top_to_bottom[README.md]"
+    thirds = []
+    for third in range(3):
+        items = [Long(name) for name in (*names, first)] + [Item("tests/a.py::quick")]
+        time_budget.keep_third(items, third)
+        assert items[-1].marks == items[-2].marks == []
+        thirds.append({item.nodeid for item in items[:-2] if not item.marks})
+    assert set().union(*thirds) == set(names) and sum(map(len, thirds)) == len(names)
+    assert all(50 < len(third) < 110 for third in thirds)
+    # All cases of a function are of one third.
+    functions = [{function_of(name) for name in third if "/site/" not in name} for third in thirds]
+    assert sum(map(len, functions)) == 60
 
 
 def test_a_file_alone_runs_the_cases_that_it_runs_among_all(tmp_path, monkeypatch):

@@ -84,6 +84,7 @@ def test_a_file_without_what_tells_roll_from_bank_is_refused():
             bank.METHODS[method].make(dataclasses.replace(CAR, **{key: None}))
 
 
+@pytest.mark.thorough
 def test_an_axle_that_slides_is_not_a_bank():
     """Level roads, dry and slippery, without satellites: the slip angle of a sliding axle is not that of its force, and taken
     as that it is a bank of 4 to 10 degrees."""

@@ -195,6 +195,7 @@ def test_a_search_that_stops_short_says_so(case, problem):
     assert all(np.isnan(leaf) for leaf in jax.tree.leaves(fit.parameters_std))
 
 
+@pytest.mark.thorough
 def test_what_a_search_says_of_its_end_is_so(case, problem):
     """Cost and uncertainty that a search knows are used as they are, also where it stops short of the optimum."""
     found = jax.jit(lambda start: problem.search(start, 3, case.tolerance))(problem.start())

@@ -254,7 +254,9 @@ SOME = (diffrax.Euler, diffrax.Tsit5)
 """One without a memory, one that keeps its last slopes."""
 
 
-@pytest.mark.parametrize("kind", [pytest.param(k, marks=() if k in SOME else pytest.mark.full) for k in EXPLICIT])
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=pytest.mark.thorough if k in SOME else pytest.mark.full) for k in EXPLICIT]
+)
 def test_equal_steps_of_every_explicit_solver_of_diffrax_are_those_of_diffeqsolve(kind):
     """And differentiate in both modes; `diffeqsolve` does so in reverse mode, with its default adjoint."""
 

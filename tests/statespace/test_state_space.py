@@ -227,7 +227,11 @@ EXPLICIT = [
 ]
 
 
-@pytest.mark.parametrize("kind", EXPLICIT)
+SOME = (diffrax.Euler, diffrax.Heun, diffrax.Tsit5)
+"""One without stages, one without a memory, one that keeps its last slopes."""
+
+
+@pytest.mark.parametrize("kind", [pytest.param(k, marks=() if k in SOME else pytest.mark.thorough) for k in EXPLICIT])
 def test_steps_of_every_explicit_solver_of_diffrax_differentiate_in_both_modes(kind):
     """The Kalman filters take slopes in forward mode, a likelihood's gradient in reverse mode."""
     assert len(EXPLICIT) >= 8
