@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
-from jaxveh.estimators.body_motion import away_from_zero, hold
+from jaxveh.estimators.body_motion import SILENCE, away_from_zero, hold
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import Lateral, lateral_of
 from jaxveh.io import CarSpecification
@@ -25,9 +25,11 @@ PARKING, DRIVING = 4.0, 8.0
 
 
 class AgreementMemory(NamedTuple):
-    """The steer (rad, NaN before its first measurement), the low-passed disagreement (rad), and how much it lately was (-)."""
+    """The last steer (rad) and for how long it has not been measured (s), the low-passed disagreement (rad), and how much it
+    lately was (-)."""
 
     steer: Any
+    silence: Any
     slow: Any
     doubt: Any
 
@@ -37,8 +39,8 @@ class SteerAgreement(eqx.Module):
     System Dynamics 36, 2001), whatever the bank: an axle that slides has another slip angle than that of its force.
 
     The disagreement through a low-pass of `time` (s), over `usual` (rad). What it was fades within `staying` (s): an axle that
-    grips again needs a moment. At the speeds of parking nothing is said. A car that slides on both axles by the same angle is
-    not noticed.
+    grips again needs a moment. At the speeds of parking, and where the steer is missing, nothing is said. A car that slides on
+    both axles by the same angle is not noticed.
 
     `ratio` (-): of the steering, None: the log must have the steer of the road wheels. `offset` (rad): the value of that
     channel when the car runs straight.
@@ -62,25 +64,24 @@ class SteerAgreement(eqx.Module):
     def start(self, t: Any) -> AgreementMemory:
         """The memory before the first row: no disagreement."""
         zero = jnp.zeros_like(t)
-        return AgreementMemory(zero + jnp.nan, zero, zero)
+        return AgreementMemory(zero, zero + SILENCE, zero, zero)
 
     def next(self, last: AgreementMemory, values: dict[str, Any], heard: dict[str, Any]) -> AgreementMemory:
         """The memory after a row with these channels, completed as `heard` (see `BodyMotion`)."""
         dt, v_x = heard["dt"], heard["v_x"]
-        steer = hold(self._steer(values), last.steer)
-        # Without this replacement the derivative would be NaN even where the result is not used.
-        known = jnp.where(jnp.isnan(steer), 0.0, steer)
+        measured = self._steer(values)
+        steer = hold(measured, last.steer)
+        silence = jnp.where(jnp.isnan(measured), last.silence + dt, 0.0)
         # Backwards the yaw rate turns the other way, and the slip angles too.
         fast = away_from_zero(v_x)
         turned = self.car.wheelbase * heard["yaw_rate"] / fast + self.car.understeer * self.car.plane_force(
             heard["a_y"]
         )
-        off = known - (v_x / fast) * turned
-        told = jnp.where(jnp.isnan(steer), 0.0, numerics.smooth_step((jnp.abs(v_x) - PARKING) / (DRIVING - PARKING)))
+        off = steer - (v_x / fast) * turned
+        told = jnp.where(silence < SILENCE, numerics.smooth_step((jnp.abs(v_x) - PARKING) / (DRIVING - PARKING)), 0.0)
         slow = last.slow + dt / (self.time + dt) * (told * off - last.slow)
-        return AgreementMemory(
-            steer, slow, jnp.maximum(jnp.abs(slow) / self.usual, last.doubt * jnp.exp(-dt / self.staying))
-        )
+        doubt = jnp.maximum(jnp.abs(slow) / self.usual, last.doubt * jnp.exp(-dt / self.staying))
+        return AgreementMemory(steer, silence, slow, doubt)
 
     def _steer(self, values):
         steer = values["steer"] - self.offset

@@ -148,8 +148,13 @@ def test_steer_agrees_with_a_steady_turn_on_any_bank_and_not_with_a_slide():
     slow = road.replace(steer=np.full(len(road), 0.5), **{name: np.full(len(road), 3.0) for name in WHEELS})
     for parking in (slow, slow.replace(**{name: -slow[name] for name in WHEELS})):
         assert (agreements(parking) == 0.0).all()
-    # Without a steer nothing is known.
+    # Without a steer nothing is known, nor where it falls silent.
     assert (agreements(road.without("steer")) == 0.0).all()
+    half = np.arange(len(road)) < 500
+    lost = road.replace(
+        steer=np.where(half, road["steer"], np.nan), yaw_rate=np.where(half, 1.0, 3.0) * road["yaw_rate"]
+    )
+    assert agreements(lost)[-1] < 0.1 < agreements(lost.replace(steer=road["steer"]))[-1]
 
 
 def test_a_car_that_stands_with_its_wheels_turned_still_feels_the_bank():
