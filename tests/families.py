@@ -3,7 +3,16 @@
 import dataclasses
 import inspect
 
+import diffrax
+
 import jaxveh
+
+EXPLICIT_SOLVERS = tuple(
+    one
+    for one in vars(diffrax).values()
+    if isinstance(one, type) and issubclass(one, diffrax.AbstractERK | diffrax.Euler) and one is not diffrax.AbstractERK
+)
+"""The explicit solvers that diffrax has, of one right side and without a step before the first."""
 
 
 def members(room, base):

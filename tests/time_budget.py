@@ -40,8 +40,8 @@ ALWAYS = ("site/test_notebooks.py", "test_a_page_runs_from_top_to_bottom[README.
 """Parts of the names of those of every third: what a user meets first."""
 
 LEFT_OUT = ("full", "thorough", "peers", "studies", "site")
-"""Marks of tests that do not run by default whatever they take. What no other test executes is marked `thorough` by hand: it
-runs in `.ci/run` whatever it takes."""
+"""Marks of tests that do not run by default whatever they take. What no other test executes is marked `thorough` by hand,
+whatever it takes."""
 
 
 def function_of(nodeid):

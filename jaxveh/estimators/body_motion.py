@@ -58,6 +58,18 @@ def speed_heard(values: dict[str, Any], front_share: Any) -> tuple[Any, Any]:
     return jnp.where(jnp.isnan(given), wheels, given), ~jnp.isnan(given) | (total > 0)
 
 
+def steer_heard(values: dict[str, Any], ratio: Any, offset: Any = 0.0) -> Any:
+    """Steer of the front wheels in this row (rad), NaN if not measured: the channel `steer` less its `offset` (rad), otherwise
+    `steering_wheel` over the steering `ratio` (-; None: that channel is not read)."""
+    steer = values["steer"] - offset
+    if ratio is None:
+        return steer
+    wheel = values["steering_wheel"]
+    # Without this replacement the derivative of the division would be NaN even where its result is not used.
+    turned = jnp.where(jnp.isnan(wheel), 0.0, wheel) / ratio
+    return jnp.where(jnp.isnan(steer), jnp.where(jnp.isnan(wheel), jnp.nan, turned), steer)
+
+
 def driven_share(front_share: Any) -> Any:
     """The share of the driving torque that acts on an axle, averaged over the axles with the weights of the speed: nearly none
     where one axle drives, a half where both drive alike."""

@@ -31,6 +31,14 @@ class Lateral(eqx.Module):
         """Lateral specific force in the road's plane (m/s^2) from a sensor on the rolling body: `a_y / (1 + g R)`."""
         return a_y / (1.0 + GRAVITY * self.roll_gradient)
 
+    def steady_steer(self, v_x: Any, yaw_rate: Any, f_y: Any) -> Any:
+        """The steer (rad) of the front wheels in a steady turn with this yaw rate (rad/s) and force (m/s^2), on any bank.
+
+        Backwards the same steer turns the car the other way, and the slip angles have the other sign.
+        """
+        fast = away_from_zero(v_x)
+        return (v_x / fast) * (self.wheelbase * yaw_rate / fast + self.understeer * f_y)
+
     def rear_speed(self, v_x: Any, yaw_rate: Any, f_y: Any) -> Any:
         """Lateral speed (m/s) at the centre of gravity when the rear axle carries its share of `f_y`."""
         return self.rear_axle_to_cg * yaw_rate - v_x * self.rear_compliance * f_y * (v_x / away_from_zero(v_x))

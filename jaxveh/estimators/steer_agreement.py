@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
-from jaxveh.estimators.body_motion import SILENCE, away_from_zero, hold
+from jaxveh.estimators.body_motion import SILENCE, hold, steer_heard
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import Lateral, lateral_of
 from jaxveh.io import CarSpecification
@@ -35,8 +35,9 @@ class AgreementMemory(NamedTuple):
 
 
 class SteerAgreement(eqx.Module):
-    """How far a car is from the steady turn of linear tyres, in which `l r / v_x = steer - understeer f_y` (H. E. Tseng, Vehicle
-    System Dynamics 36, 2001), whatever the bank: an axle that slides has another slip angle than that of its force.
+    """How far a car is from the steady turn of linear tyres, in which `l r / v_x = steer - understeer f_y` whatever the bank
+    (`Lateral.steady_steer`; H. E. Tseng, Vehicle System Dynamics 36, 2001): an axle that slides has another slip angle than
+    that of its force.
 
     The disagreement through a low-pass of `time` (s), over `usual` (rad). What it was fades within `staying` (s): an axle that
     grips again needs a moment. At the speeds of parking, and where the steer is missing, nothing is said. A car that slides on
@@ -69,27 +70,14 @@ class SteerAgreement(eqx.Module):
     def next(self, last: AgreementMemory, values: dict[str, Any], heard: dict[str, Any]) -> AgreementMemory:
         """The memory after a row with these channels, completed as `heard` (see `BodyMotion`)."""
         dt, v_x = heard["dt"], heard["v_x"]
-        measured = self._steer(values)
+        measured = steer_heard(values, self.ratio, self.offset)
         steer = hold(measured, last.steer)
         silence = jnp.where(jnp.isnan(measured), last.silence + dt, 0.0)
-        # Backwards the yaw rate turns the other way, and the slip angles too.
-        fast = away_from_zero(v_x)
-        turned = self.car.wheelbase * heard["yaw_rate"] / fast + self.car.understeer * self.car.plane_force(
-            heard["a_y"]
-        )
-        off = steer - (v_x / fast) * turned
+        off = steer - self.car.steady_steer(v_x, heard["yaw_rate"], self.car.plane_force(heard["a_y"]))
         told = jnp.where(silence < SILENCE, numerics.smooth_step((jnp.abs(v_x) - PARKING) / (DRIVING - PARKING)), 0.0)
         slow = last.slow + dt / (self.time + dt) * (told * off - last.slow)
         doubt = jnp.maximum(jnp.abs(slow) / self.usual, last.doubt * jnp.exp(-dt / self.staying))
         return AgreementMemory(steer, silence, slow, doubt)
-
-    def _steer(self, values):
-        steer = values["steer"] - self.offset
-        if self.ratio is None:
-            return steer
-        wheel = values["steering_wheel"]
-        turned = jnp.where(jnp.isnan(wheel), jnp.nan, jnp.where(jnp.isnan(wheel), 0.0, wheel) / self.ratio)
-        return jnp.where(jnp.isnan(steer), turned, steer)
 
 
 def agreement_of(car: CarSpecification, who: str) -> SteerAgreement | None:

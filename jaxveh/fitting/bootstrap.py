@@ -44,7 +44,7 @@ def bootstrap(
     `groups` (rows,): numbers of the groups that are drawn as a whole, such as the run of each row. Each fit starts at the
     optimum for all the data. `max_steps`, `tolerance` as in `solve`.
 
-    **Raises** `InputError` for fewer than two fits, or fewer than five parts.
+    **Raises** `InputError` for fewer than two fits, fewer than five parts, or `max_steps` below one.
     """
     check_whole("count", count, 2)
     check_whole("max_steps", max_steps)

@@ -130,7 +130,7 @@ def maximum_likelihood(
     `solve`.
 
     **Returns** a `Fit` whose `model` has the new values; standard errors from the Hessian at the optimum.
-    **Raises** `InputError` as `run` does; `FilterError` if the solver does not converge, unless `throw=False`.
+    **Raises** `InputError` as `run` and `solve` do; `FilterError` if the solver does not converge, unless `throw=False`.
     """
     problem = pose_likelihood(filter, model, recordings, where, prior=prior, key=key)
     fit = solve(problem, max_steps=max_steps, tolerance=tolerance, standard_errors=standard_errors)

@@ -177,7 +177,8 @@ def multiple_shooting(
     concrete; see `solve`.
 
     **Returns** a `Fit`; standard errors from the Jacobian at the optimum, with the starts marginalised. **Raises** `InputError`
-    for a model without parameters, or logs too short; `FilterError` if the solver does not converge (`throw`).
+    for a model without parameters, logs too short, or `max_steps` below one; `FilterError` if the solver does not converge
+    (`throw`).
     """
     problem = pose_shooting(model, cut(model, recordings, window), where, prior=prior, tie=tie)
     fit = solve(problem, max_steps=max_steps, tolerance=tolerance, standard_errors=standard_errors)

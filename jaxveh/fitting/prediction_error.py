@@ -228,7 +228,8 @@ def prediction_error(
     log-posterior; for exact derivatives, make it small.
 
     **Returns** a `Fit`; standard errors from the expected information. **Raises** `InputError` for a filter without
-    whitened innovations, or recordings of different length; `FilterError` if it does not converge (`throw`).
+    whitened innovations, recordings of different length, or `max_steps` below one; `FilterError` if it does not converge
+    (`throw`).
     """
     check_positive("tolerance", tolerance)
     check_whole("max_steps", max_steps)

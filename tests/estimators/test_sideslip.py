@@ -258,7 +258,7 @@ CALIBRATED = {
 reference is turned by half a degree, without the constant part."""
 
 IN_CI = ("ferrari_250lm", "forward")
-"""The one that `.ci/run` has; the others are left to the full run."""
+"""The one that is `thorough`; the others are left to the full run."""
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """What every filter makes of a short recording, by every setting that changes it, as recorded.
 
-They all run in `.ci/run`, whatever they take: of many filters no other test there runs a step.
+They all are `thorough`, whatever they take: of many filters no other test there runs a step.
 Particles, too: their draws are of a key, and rounding moves an ancestor about once in a thousand million draws.
 """
 

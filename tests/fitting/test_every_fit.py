@@ -46,7 +46,7 @@ def a_law():
 
 
 class Case(NamedTuple):
-    """`pose(prior)` makes the problem, `fit()` runs the program; `data`, `noise` and `prior` pick one leaf each of the
+    """`pose(prior)` makes the problem, `fit(max_steps)` runs the program; `data`, `noise` and `prior` pick one leaf each of the
     problem."""
 
     pose: Callable
@@ -61,22 +61,24 @@ PIECES = [drive(21, seed=1), drive(21, seed=2)]
 CASES = {
     "fit_rig": Case(
         lambda prior=0.02: fitting.pose_rig(a_law(), a_rig(), noise=NOISE, where=FRICTION, prior=prior),
-        lambda: fitting.fit_rig(a_law(), a_rig(), where=FRICTION, prior=0.02),
+        lambda **more: fitting.fit_rig(a_law(), a_rig(), where=FRICTION, prior=0.02, **more),
         lambda p: p.measured, lambda p: p.weight, lambda p: p.spread, 1e-12,
     ),
     "multiple_shooting": Case(
         lambda prior=0.5: fitting.pose_shooting(plain(), fitting.cut(plain(), PIECES, 1.0), PENDULUM, prior=prior, tie=0.1),
-        lambda: fitting.multiple_shooting(plain(), PIECES, PENDULUM, prior=0.5, window=1.0, tie=0.1, max_steps=MOST_STEPS),
+        lambda max_steps=MOST_STEPS: fitting.multiple_shooting(
+            plain(), PIECES, PENDULUM, prior=0.5, window=1.0, tie=0.1, max_steps=max_steps
+        ),
         lambda p: p.segments.rows.y.rate, lambda p: p.model.measurement_noise.std.rate, lambda p: p.prior, 1e-12,
     ),
     "maximum_likelihood": Case(
         lambda prior=0.3: fitting.pose_likelihood(FILTER, nile(), YEARS, LEVELS, prior=prior),
-        lambda: fitting.maximum_likelihood(FILTER, nile(), YEARS, LEVELS, prior=0.3),
+        lambda **more: fitting.maximum_likelihood(FILTER, nile(), YEARS, LEVELS, prior=0.3, **more),
         lambda p: p.rows[0].y.flow, lambda p: p.model.prior.law.std.level, lambda p: p.spread, 1e-12,
     ),
     "prediction_error": Case(
         lambda prior=0.3: fitting.pose_prediction_error(FILTER, nile(), YEARS, LEVELS, prior=prior),
-        lambda: fitting.prediction_error(FILTER, nile(), YEARS, LEVELS, prior=0.3, tolerance=1e-6),
+        lambda **more: fitting.prediction_error(FILTER, nile(), YEARS, LEVELS, prior=0.3, tolerance=1e-6, **more),
         lambda p: p.rows.y.flow, lambda p: p.model.prior.law.std.level, lambda p: p.spread, 1e-12,
     ),
 }  # fmt: skip
@@ -205,8 +207,12 @@ def test_what_a_search_says_of_its_end_is_so(case, problem):
         jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-7, atol=1e-14), found.uncertainty, there)
 
 
-def test_no_step_at_all_is_refused(problem):
+def test_no_step_at_all_is_refused(case, problem):
     """A search that takes no step knows nothing of its end."""
+    with pytest.raises(InputError, match="max_steps = 0: must be"):
+        case.fit(max_steps=0)
+    with pytest.raises(InputError, match="max_steps = 0: must be"):
+        fitting.bootstrap(problem, jax.random.key(0), max_steps=0)
     for most in (0, 2.5):
         with pytest.raises(InputError, match=f"max_steps = {most}: must be a whole number of at least 1"):
             fitting.solve(problem, max_steps=most)

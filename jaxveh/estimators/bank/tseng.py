@@ -14,7 +14,6 @@ from jaxveh.estimators.body_motion import (
     SILENCE,
     BodyMotion,
     arcsin_of,
-    away_from_zero,
     hold,
     number_of,
 )
@@ -73,7 +72,7 @@ class Tseng(AbstractMethod):
         static = arcsin_of(f_y - v_x * turn)
         slow = memory.bank + share * (static - memory.bank)
         rate = (static - slow) / self.time
-        residual = wheel / self.ratio - self.car.wheelbase * turn / away_from_zero(v_x) - self.car.understeer * f_y
+        residual = wheel / self.ratio - self.car.steady_steer(v_x, turn, f_y)
         trust = jnp.maximum(0.0, 1.0 - jnp.abs(residual) / self.doubt - jnp.abs(rate) / self.doubt_rate)
         agreement = memory.agreement + share * (trust - memory.agreement)
         there = heard["silence"] < SILENCE

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.estimators.body_motion import steer_heard
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.sequential import (
     Belief,
@@ -130,12 +131,7 @@ class SlipAware(AbstractMethod):
     # The last measurements.
 
     def _hear(self, memory: Memory, t, values):
-        steer = values["steer"] - self.car.steer_offset
-        wheel = values["steering_wheel"]
-        # Without this replacement the derivative of the division would be NaN even where its result is not used.
-        turned = jnp.where(jnp.isnan(wheel), 0.0, wheel) / self.car.steering_ratio
-        turned = jnp.where(jnp.isnan(wheel), jnp.nan, turned)
-        now = dict(values) | {"steer": jnp.where(jnp.isnan(steer), turned, steer)}
+        now = dict(values) | {"steer": steer_heard(values, self.car.steering_ratio, self.car.steer_offset)}
         torques = [values[f"torque_{place}"] for place in AT]
         now["drive_torque"] = jnp.where(jnp.isnan(now["drive_torque"]), sum(torques), now["drive_torque"])
         heard = {n: jnp.where(jnp.isnan(now[n]), memory.heard[n], now[n]) for n in HELD}
