@@ -12,7 +12,7 @@ from pathlib import Path
 
 import jax
 import pytest
-from time_budget import keep_one_colour, keep_third, keep_to_budget, record_seconds
+from time_budget import keep_fifth, keep_one_colour, keep_to_budget, record_seconds
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
@@ -64,8 +64,8 @@ def keep_programs(config):
 def pytest_collection_modifyitems(items):
     keep_one_colour(items)
     keep_to_budget(items)
-    if "JAXVEH_THIRD" in os.environ:
-        keep_third(items, int(os.environ["JAXVEH_THIRD"]))
+    if "JAXVEH_FIFTH" in os.environ:
+        keep_fifth(items, int(os.environ["JAXVEH_FIFTH"]))
 
 
 def pytest_collection_finish():

@@ -10,9 +10,9 @@ the others are not. A function that is not on record runs whole, so that a new o
 
 `JAXVEH_SECONDS=1 python -m pytest` records them again.
 
-`JAXVEH_THIRD=0`, `1` or `2` leaves two thirds of what is `thorough` or of the `studies` to `-m full`. `.ci/run` takes the third
-that the commit decides, so that changes in a row run all of them, and the same commit always the same: all of them at once would
-take it 30 minutes. Without it all run.
+`JAXVEH_FIFTH=0` to `4` leaves four fifths of what is `thorough` or of the `studies` to `-m full`. `.ci/run` takes the fifth that
+the commit decides, so that changes in a row run all of them, and the same commit always the same: all of them at once would take
+it 30 minutes. Without it all run.
 """
 
 import json
@@ -37,7 +37,7 @@ COLOURS = 6
 RECORD = Path(__file__).parent / "recorded" / "seconds.json"
 
 ALWAYS = ("site/test_notebooks.py", "test_a_page_runs_from_top_to_bottom[README.md]", "[jaxveh estimate drive.csv")
-"""Parts of the names of those of every third: what a user meets first."""
+"""Parts of the names of those of every fifth: what a user meets first."""
 
 LEFT_OUT = ("full", "thorough", "peers", "studies", "site")
 """Marks of tests that do not run by default whatever they take. What no other test executes is marked `thorough` by hand,
@@ -101,13 +101,13 @@ def mark_long(functions):
             item.add_marker(pytest.mark.thorough if spent <= LONG_BUDGET else pytest.mark.full)
 
 
-def keep_third(items, third):
-    """Mark as `full` those long tests that are not of this third, 0 to 2: of pages each by itself, of other files each function
-    with all its cases, which share what they compile. Whatever stands beside a test, it is of the same third."""
+def keep_fifth(items, fifth):
+    """Mark as `full` those long tests that are not of this fifth, 0 to 4: of pages each by itself, of other files each function
+    with all its cases, which share what they compile. Whatever stands beside a test, it is of the same fifth."""
     for item in items:
         long = item.get_closest_marker("thorough") or item.get_closest_marker("studies")
         name = item.nodeid if "/site/" in item.nodeid else function_of(item.nodeid)
-        if long and not any(part in item.nodeid for part in ALWAYS) and zlib.crc32(name.encode()) % 3 != third:
+        if long and not any(part in item.nodeid for part in ALWAYS) and zlib.crc32(name.encode()) % 5 != fifth:
             item.add_marker(pytest.mark.full)
 
 

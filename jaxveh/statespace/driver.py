@@ -171,12 +171,16 @@ def in_form_for_batches(
         of = lambda steps: lambda: form(filter, model, rows, *more, steps=steps)
         if who_lacks(filter, "shares_covariances") is not None:
             return of(Steps.written_out)()
-        missing = jnp.stack([~jnp.isfinite(values).all() for values in jax.tree.leaves(rows)]).any()
-        of_any = jax.lax.pmax(missing.astype(jnp.int32), numerics.RUNS)
-        return jax.lax.cond(of_any > 0, of(Steps.written_out), of(Steps.complete))
+        return jax.lax.cond(any_run_misses(rows), of(Steps.written_out), of(Steps.complete))
 
     single = functools.partial(form, steps=alone)
     return numerics.by_batch(single, many, filter, model, rows, *more, least=least)
+
+
+def any_run_misses(rows: Row) -> Any:
+    """Whether any run of the block of runs has a number that is not finite, in the form for many of `numerics.by_batch`."""
+    missing = jnp.stack([~jnp.isfinite(values).all() for values in jax.tree.leaves(rows)]).any()
+    return jax.lax.pmax(missing.astype(jnp.int32), numerics.RUNS) > 0
 
 
 def scan_in_form(

@@ -22,6 +22,7 @@ from jaxveh.statespace.draw import draw_rows, schedule_rows
 from jaxveh.statespace.driver import (
     SHOWN,
     Steps,
+    any_run_misses,
     in_form_for_batches,
     raise_failure,
     scan_and_keep,
@@ -42,6 +43,7 @@ __all__ = [
     "SHOWN",
     "UNNAMED",
     "Steps",
+    "any_run_misses",
     "by_channel",
     "check_covariance",
     "check_fixed",

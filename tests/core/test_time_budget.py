@@ -52,20 +52,20 @@ class Long(Item):
         return name in ("thorough", "studies") or None
 
 
-def test_three_thirds_are_all_long_tests_and_share_only_what_a_user_meets_first():
+def test_five_fifths_are_all_long_tests_and_share_only_what_a_user_meets_first():
     names = [f"tests/a.py::f{k}[{case}]" for k in range(60) for case in range(3)]
     names += [f"tests/site/test_pages_run.py::page[{k}.md]" for k in range(60)]
     first = "tests/site/test_pages_run.py::test_a_page_runs_from_top_to_bottom[README.md]"
-    thirds = []
-    for third in range(3):
+    fifths = []
+    for fifth in range(5):
         items = [Long(name) for name in (*names, first)] + [Item("tests/a.py::quick")]
-        time_budget.keep_third(items, third)
+        time_budget.keep_fifth(items, fifth)
         assert items[-1].marks == items[-2].marks == []
-        thirds.append({item.nodeid for item in items[:-2] if not item.marks})
-    assert set().union(*thirds) == set(names) and sum(map(len, thirds)) == len(names)
-    assert all(50 < len(third) < 110 for third in thirds)
-    # All cases of a function are of one third.
-    functions = [{function_of(name) for name in third if "/site/" not in name} for third in thirds]
+        fifths.append({item.nodeid for item in items[:-2] if not item.marks})
+    assert set().union(*fifths) == set(names) and sum(map(len, fifths)) == len(names)
+    assert all(30 < len(fifth) < 70 for fifth in fifths)
+    # All cases of a function are of one fifth.
+    functions = [{function_of(name) for name in fifth if "/site/" not in name} for fifth in fifths]
     assert sum(map(len, functions)) == 60
 
 

@@ -8,6 +8,7 @@ import pytest
 from test_every_filter import FILTERS, MODELS, recordings
 
 from jaxveh import InputError, Result, filters
+from jaxveh.filters.smoothing import parallel
 from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
 from jaxveh.statespace import Info, Smoothing, kit
 from jaxveh.statespace.contract import who_lacks
@@ -138,6 +139,9 @@ def complete_rows(rows):
     return jax.tree.map(lambda leaf: jnp.where(jnp.isnan(leaf), 0.1, leaf), rows)
 
 
+FORMS = {"filtered": filters.scan, "smoothed": rauch_tung_striebel, "in parallel": parallel.smooth_rows}
+
+
 @pytest.mark.parametrize("missing", [False, True], ids=["complete", "one missing"])
 @pytest.mark.parametrize("name", SHARED)
 def test_runs_share_covariances_where_no_row_is_missing(name, missing):
@@ -145,7 +149,8 @@ def test_runs_share_covariances_where_no_row_is_missing(name, missing):
     rows = complete_rows(rows)
     if missing:
         rows = rows._replace(y=rows.y._replace(y1=rows.y.y1.at[1, 3].set(jnp.nan)))
-    for form in (filters.scan, rauch_tung_striebel):
+    # In parallel over time there is the form with covariances alone.
+    for form in list(FORMS.values())[: None if filter_.form.keeps_matrix else 2]:
         batch = eqx.filter_vmap(lambda rows, form=form: form(filter_, model, rows), in_axes=(eqx.if_array(0),))(rows)
         for i in range(len(rows.t)):
             same(
@@ -154,17 +159,23 @@ def test_runs_share_covariances_where_no_row_is_missing(name, missing):
             )
 
 
-def test_shared_covariances_are_reckoned_once_and_those_of_other_noises_are_not():
+def kept_by(found):
+    """The log-likelihood and the means, which the measurements change."""
+    estimate = getattr(found, "filtered", found)
+    return estimate.log_likelihood, found.mean
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_shared_covariances_are_reckoned_once_and_those_of_other_noises_are_not(form):
     model, rows = rows_and_model()
     rows = jax.tree.map(lambda leaf: leaf[0], complete_rows(rows))
     y = jax.tree.map(lambda leaf: jnp.stack([leaf + 0.1 * k for k in range(7)]), rows.y)
 
     def batched(filter_, noise):
         """Of each branch (complete, not complete), how many results have the batch's axis."""
-        scan = lambda y, noise: filters.scan(
-            filter_, eqx.tree_at(lambda m: m.measurement_noise.std.y0, model, noise), rows._replace(y=y), None, ()
-        )
-        program = jax.make_jaxpr(jax.vmap(scan, in_axes=(0, 0 if noise.ndim else None)))(y, noise)
+        with_noise = lambda noise: eqx.tree_at(lambda m: m.measurement_noise.std.y0, model, noise)
+        of = lambda y, noise: kept_by(FORMS[form](filter_, with_noise(noise), rows._replace(y=y)))
+        program = jax.make_jaxpr(jax.vmap(of, in_axes=(0, 0 if noise.ndim else None)))(y, noise)
         (branches,) = [
             equation.params["branches"] for equation in program.jaxpr.eqns[0].params["jaxpr"].jaxpr.eqns
             if equation.primitive.name == "cond"
@@ -175,6 +186,20 @@ def test_shared_covariances_are_reckoned_once_and_those_of_other_noises_are_not(
     assert complete < 0.4 * other
     complete, other = batched(filters.Kalman(), jnp.linspace(0.5, 0.6, 7))
     assert complete > 0.8 * other
+
+
+def test_the_gradient_of_a_batch_in_parallel_is_that_of_its_runs():
+    model, rows = rows_and_model()
+    rows = complete_rows(rows)
+
+    def total(noise, rows):
+        found = parallel.smooth_rows(filters.Kalman(), eqx.tree_at(lambda m: m.measurement_noise.std.y0, model, noise), rows)
+        return found.filtered.log_likelihood + jnp.sum(found.mean.x0)
+
+    noise = jnp.asarray(0.5)
+    batch = jax.grad(lambda noise: jnp.sum(jax.vmap(total, in_axes=(None, 0))(noise, rows)))(noise)
+    runs = [jax.grad(total)(noise, jax.tree.map(lambda leaf, i=i: leaf[i], rows)) for i in range(len(rows.t))]
+    np.testing.assert_allclose(batch, sum(runs), rtol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -57,14 +57,17 @@ class Passed(NamedTuple):
     lines: Lines
 
 
-def pass_over(rule: AbstractRule, model: StateSpace, rows: Row, means: Any, covariances: Any) -> Passed:
-    """Filter and smoother of the model linearised under N(means, covariances) in every row.
+def pass_over(
+    rule: AbstractRule, model: StateSpace, rows: Row, means: Any, covariances: Any, *, complete: bool = False
+) -> Passed:
+    """Filter and smoother of the model linearised under N(means, covariances) in every row; `complete`: nothing in `rows` is
+    missing.
 
     S. Sarkka & A. Garcia-Fernandez, Temporal parallelization of Bayesian smoothers, IEEE Trans. Automatic Control 66 (2021).
     """
-    moves, sees = _lines(rule, model, rows, means, covariances)
+    moves, sees = _lines(rule, model, rows, means, covariances, complete)
     about = means
-    y, R = _measurements(model, rows, about)
+    y, R = _measurements(model, rows, about, complete)
     if model.angles:
         # A measured angle is taken in the turn that is nearest to the linearised prediction.
         seen = jnp.einsum("tmn,tn->tm", sees.slope, means) + sees.offset
@@ -84,7 +87,13 @@ def pass_over(rule: AbstractRule, model: StateSpace, rows: Row, means: Any, cova
     return Passed(predicted, filtered, (joined.g, numerics.symmetric(joined.L)), about, sees)
 
 
-def _lines(rule, model, rows: Row, means, covariances) -> tuple[Lines, Lines]:
+def _presence(model, row, complete: bool):
+    """`kit.presence`. Where all is there it does not depend on the measurements: a batch of runs has the same covariances."""
+    values, present = kit.presence(model, row)
+    return values, dict.fromkeys(present, jnp.asarray(True)) if complete else present
+
+
+def _lines(rule, model, rows: Row, means, covariances, complete) -> tuple[Lines, Lines]:
     """The lines of the transitions (T - 1), whose errors include the process noise, and those of the observations (T)."""
 
     def belief(row, mean, covariance):
@@ -101,7 +110,7 @@ def _lines(rule, model, rows: Row, means, covariances) -> tuple[Lines, Lines]:
 
     def see(row, mean, covariance):
         now = belief(row, mean, covariance)
-        return _line(observation_image(model, now, row, kit.presence(model, row)[1]), now)
+        return _line(observation_image(model, now, row, _presence(model, row, complete)[1]), now)
 
     before = jax.tree.map(lambda leaf: leaf[:-1], (rows, means, covariances))
     moves = jax.vmap(move)(before[0], rows.t[1:], jax.tree.map(lambda u: u[1:], rows.u), *before[1:])
@@ -113,13 +122,13 @@ def _line(image, belief) -> Lines:
     return Lines(slope, image.mean - slope @ belief.vector, product(rest, rest, image.signs))
 
 
-def _measurements(model, rows: Row, means):
+def _measurements(model, rows: Row, means, complete):
     """Measurements (T, m), zero where missing, and noise covariances (T, m, m), of unit variance where missing. Noise
     that depends on the state is taken at the `means` (T, n)."""
     kind = type(model.prior.mean)
 
     def of(row, mean):
-        values, present = kit.presence(model, row)
+        values, present = _presence(model, row, complete)
         here = jnp.stack([present[name] for name in model.channels])
         law = law_at(model, row, lambda: kind(*mean))
         noise = masked_factor(law, model.channels, here, row.t.dtype)
@@ -153,9 +162,9 @@ def _filtering_elements(moves: Lines, sees: Lines, y, R, prior) -> Filtering:
 
 def _join_filtering(i: Filtering, j: Filtering) -> Filtering:
     """Join an earlier element i and a later element j (eq 15 and lemma 8 of the paper)."""
-    eye = jnp.eye(i.C.shape[0], dtype=i.C.dtype)
-    forward = jnp.linalg.solve((eye + i.C @ j.J).T, j.A.T).T
-    backward = jnp.linalg.solve((eye + j.J @ i.C).T, i.A).T
+    # C and J are symmetric: the transpose of this inverse is that of I + J C.
+    inverse = jnp.linalg.inv(jnp.eye(i.C.shape[0], dtype=i.C.dtype) + i.C @ j.J)
+    forward, backward = j.A @ inverse, (inverse @ i.A).T
     return Filtering(
         A=forward @ i.A,
         b=forward @ (i.b + i.C @ j.eta) + j.b,
@@ -179,12 +188,12 @@ def _join_smoothing(j: SmoothingElement, i: SmoothingElement) -> SmoothingElemen
     return SmoothingElement(i.E @ j.E, i.E @ j.g + i.g, i.E @ j.L @ i.E.T + i.L)
 
 
-def info_of(model: StateSpace, rows: Row, passed: Passed) -> Any:
-    """The info (T,) of all rows: the measurements beside their predictions."""
-    y, R = _measurements(model, rows, passed.about)
+def info_of(model: StateSpace, rows: Row, passed: Passed, *, complete: bool = False) -> Any:
+    """The info (T,) of all rows: the measurements beside their predictions; `complete` as for `pass_over`."""
+    y, R = _measurements(model, rows, passed.about, complete)
 
     def of(row, y, R, mean, covariance, line):
-        _, present = kit.presence(model, row)
+        _, present = _presence(model, row, complete)
         here = jnp.stack([present[name] for name in model.channels])
         innovation = wrapped_innovation(model, y - line.slope @ mean - line.offset, here)
         factor = numerics.cholesky(line.slope @ covariance @ line.slope.T + line.error + R)

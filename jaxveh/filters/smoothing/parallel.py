@@ -49,7 +49,7 @@ def smooth_parallel(
             f"smooth_parallel: {type(filter).__name__} with the angle(s) {', '.join(model.angles)}: innovations are "
             "wrapped, which is not a linear update. Use Iterated(Extended(), 2), or smooth."
         )
-    found = _smooth(filter, model, model.rows(recording))
+    found = smooth_rows(filter, model, model.rows(recording))
     found = eqx.tree_at(lambda e: (e.time, e.filtered.time), found, (recording.time, recording.time))
     if throw:
         kit.raise_failure(found.filtered, filter, model, recording)
@@ -57,18 +57,34 @@ def smooth_parallel(
 
 
 @eqx.filter_jit
-def _smooth(filter, model, rows: Row) -> SmoothedEstimate:
+def smooth_rows(filter, model, rows: Row) -> SmoothedEstimate:
+    """The compiled part of `smooth_parallel`, over rows with (T,) leaves.
+
+    In a batch of runs of a linear model with the same noises, of which no row is missing, the covariances are computed
+    once."""
+    if kit.who_lacks(filter, "shares_covariances") is not None:
+        return _smooth_rows(filter, model, rows)
+
+    def many(filter, model, rows):
+        of = lambda complete: lambda: _smooth_rows(filter, model, rows, complete)
+        return jax.lax.cond(kit.any_run_misses(rows), of(False), of(True))
+
+    return numerics.by_batch(_smooth_rows, many, filter, model, rows, least=2)
+
+
+def _smooth_rows(filter, model, rows: Row, complete: bool = False) -> SmoothedEstimate:
+    """The result for one run; `complete`: nothing in its rows is missing."""
     rule = kit.innermost(filter).rule(len(model.states))
     wide = lambda leaf: jnp.broadcast_to(leaf, (*rows.t.shape, *leaf.shape))
     path = wide(jnp.stack(model.prior.mean)), wide(model.prior.covariance())
 
     def again(path, _):
-        return pass_over(rule, model, rows, *path).smoothed, None
+        return pass_over(rule, model, rows, *path, complete=complete).smoothed, None
 
     # The last pass follows below.
     path, _ = jax.lax.scan(jax.checkpoint(again), path, length=max(filter.linearisations - 1, 0))
-    passed = pass_over(rule, model, rows, *path)
-    info = info_of(model, rows, passed)
+    passed = pass_over(rule, model, rows, *path, complete=complete)
+    info = info_of(model, rows, passed, complete=complete)
     beliefs = lambda gaussians: jax.vmap(lambda row, m, P: _belief(model, rule, row, m, P))(rows, *gaussians)
     filtered, smoothed = beliefs(passed.filtered), beliefs(passed.smoothed)
     moments = jax.vmap(lambda belief: belief.moments(model))
