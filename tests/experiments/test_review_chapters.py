@@ -36,6 +36,14 @@ def test_an_error_is_scored_from_the_warm_up_until_the_car_is_lost():
     assert scored(np.where(TIME == 17.0, np.nan, error), 0.0, held=held)["failed"] == 0.0
 
 
+@pytest.mark.parametrize("channel", ["sideslip", "roll"])
+def test_a_car_that_spins_or_tips_over_is_lost_to_the_end(channel):
+    drives = {f"true.{name}": np.zeros((2, 1, TIME.size)) for name in ("sideslip", "roll")}
+    drives[f"true.{channel}"][1, 0, 700:720] = -1.1 * racing.LOST
+    held = np.asarray(racing.held_rows(drives))
+    assert held[0].all() and held[1, 0, :700].all() and not held[1, 0, 700:].any()
+
+
 def test_a_claimed_spread_is_scored_where_the_method_says_that_it_knows():
     error = np.where(TIME < 10.0, 6.0, 2.0)
     assert scored(error, 0.0, TIME >= 10.0, std=0.5)["nees"] == pytest.approx(16.0)

@@ -167,7 +167,7 @@ def _run(methods: list[AbstractMethod], conclude: Callable[[Any, dict], dict]):
 
 def _score(module: ModuleType, said: Any, drive: dict) -> dict[str, Any]:
     shown = [name for name in module.SHOWN if f"true.{name}" in drive]
-    held = jnp.cumprod((jnp.abs(drive["true.sideslip"]) < LOST).astype(int)) > 0
+    held = held_rows(drive)
     return {
         name: metrics(
             getattr(said.mean, name), getattr(said.std, name), getattr(said.known, name), drive[f"true.{name}"], held
@@ -184,7 +184,13 @@ WARM_UP = 5.0
 
 
 LOST = np.radians(20.0)
-"""rad of sideslip: from there on a car has spun, and the rest of the drive is not scored."""
+"""rad of sideslip, or of roll: from there on a car has spun or tipped over, and the rest of the drive is not scored."""
+
+
+def held_rows(drive: Mapping[str, Any]) -> Any:
+    """The rows (..., T) up to the one in which the driver loses the car."""
+    leans = jnp.maximum(jnp.abs(drive["true.sideslip"]), jnp.abs(drive["true.roll"]))
+    return jnp.cumprod((leans < LOST).astype(int), axis=-1) > 0
 
 
 def metrics(mean, std, known, truth, held) -> dict[str, Any]:
@@ -214,7 +220,7 @@ def metrics(mean, std, known, truth, held) -> dict[str, Any]:
 def _nothing(drives: Mapping[str, np.ndarray]) -> dict[tuple[str, str], dict[str, np.ndarray]]:
     """The errors of doing nothing, by quantity and name."""
     found = {}
-    shape = drives["car"].shape
+    shape, all_held = drives["car"].shape, np.asarray(held_rows(drives))
     for quantity, module in quantities().items():
         for name in module.SHOWN:
             if f"true.{name}" in drives:
@@ -228,7 +234,7 @@ def _nothing(drives: Mapping[str, np.ndarray]) -> dict[tuple[str, str], dict[str
             for name, values in guess.items():
                 if (quantity, name) in found:
                     error = np.asarray(values) - drives[f"true.{name}"][place]
-                    held = np.cumprod(np.abs(drives["true.sideslip"][place]) < LOST) > 0
+                    held = all_held[place].copy()
                     held[: round(WARM_UP / STEP)] = False
                     squares = error[held & np.isfinite(error)] ** 2
                     # A car that spins in the first seconds has no row that is scored.
