@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 
@@ -96,12 +97,13 @@ class MotionMemory(NamedTuple):
     silence: Any
     pull_silence: Any
     speed_silence: Any
+    wheel_silence: Any
     started: Any
 
 
 class BodyMotion(AbstractCleaning):
-    """Completes every row: the last measured `a_x`, `a_y`, `yaw_rate`, `v_x` (`speed_spoke`: whether the speed is new), and
-    quantities derived from them.
+    """Completes every row: the last measured `a_x`, `a_y`, `yaw_rate`, `v_x` (`speed_spoke`: whether the speed is new,
+    `speed_told`: whether it is that of a channel `v_x`), and quantities derived from them.
 
     - `v_x_rate`, `slow_a_x` (m/s^2) and `slope` (rad): the rate of the speed and `a_x`, both through a low-pass of `slope_time`
     (s), and the body's pitch against the horizon, nose up, `(a_x - v_x_rate) / g` through the same low-pass.
@@ -109,12 +111,14 @@ class BodyMotion(AbstractCleaning):
     - `dt` (s): the time since the last row; `silence`, `pull_silence` (s): the time since the last measurement of `a_y` and
       `yaw_rate`, or of `a_x`; or of the speed, if that is longer.
 
-    `front_share`: the front axle's share of the driving torque. Other channels are passed on.
+    `front_share`: the front axle's share of the driving torque. `wheels_first`: a channel `v_x` is not used while wheels speak,
+    except in reverse, where wheels may count forwards. Other channels are passed on.
     """
 
     front_share: jax.Array = parameter("-", default=0.5)
     slope_time: jax.Array = positive("s", default=0.7)
     delay: jax.Array = positive("s", default=0.15)
+    wheels_first: bool = eqx.field(static=True, default=False)
 
     @property
     def channels(self):
@@ -123,12 +127,17 @@ class BodyMotion(AbstractCleaning):
     def first(self, t, values):
         zero = jnp.zeros_like(t)
         silent = zero + SILENCE
-        memory = MotionMemory(t, zero, zero, zero, zero, zero, zero, zero, silent, silent, silent, zero)
+        memory = MotionMemory(t, zero, zero, zero, zero, zero, zero, zero, silent, silent, silent, silent, zero)
         return self.next(memory, t, values)
 
     def next(self, memory, t, values):
         dt = t - memory.t
-        heard, spoke = speed_heard(values, self.front_share)
+        wheels = jnp.stack([values[need.channel] for need in SPEEDS[1:]])
+        wheel_silence = jnp.where(jnp.all(jnp.isnan(wheels)), memory.wheel_silence + dt, 0.0)
+        told = values["v_x"]
+        if self.wheels_first:
+            told = jnp.where((wheel_silence < SILENCE) & ~(told < 0.0), jnp.nan, told)
+        heard, spoke = speed_heard(values | {"v_x": told}, self.front_share)
         v_x = jnp.where(spoke, heard, memory.v_x)
         a_x, a_y, yaw_rate = (hold(values[name], getattr(memory, name)) for name in ("a_x", "a_y", "yaw_rate"))
         pulled = ~jnp.isnan(values["a_x"])
@@ -144,6 +153,7 @@ class BodyMotion(AbstractCleaning):
             t, a_x, a_y, yaw_rate, v_x, slow_a_x, slow_speed, late,
             jnp.where(turned, 0.0, memory.silence + dt), jnp.where(pulled, 0.0, memory.pull_silence + dt),
             jnp.where(spoke, 0.0, memory.speed_silence + dt),
+            wheel_silence,
             jnp.where(spoke, 1.0, memory.started),
         )  # fmt: skip
         slope = jnp.clip((slow_a_x - v_x_rate) / GRAVITY, -0.5, 0.5)
@@ -153,6 +163,7 @@ class BodyMotion(AbstractCleaning):
             "yaw_rate": yaw_rate,
             "v_x": v_x,
             "speed_spoke": spoke,
+            "speed_told": ~jnp.isnan(told),
             "v_x_rate": v_x_rate,
             "slow_a_x": slow_a_x,
             "slope": slope,

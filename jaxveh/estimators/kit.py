@@ -2,17 +2,14 @@
 
 from jaxveh.estimators.catalogue import FULL_CAR, catalogue, keys_asked
 from jaxveh.estimators.contract import Need, check_needs, cut_pieces, in_words, model_of, spans_of, start_of
+from jaxveh.estimators.following import follow, follow_rows, smooth_rows
 from jaxveh.estimators.live import AbstractCleaning, AsItIs, clean_recording
-from jaxveh.estimators.method import (
-    answer,
-    follow,
-    follow_rows,
-    method_of,
-)
+from jaxveh.estimators.method import AbstractSmoothable, answer, method_of
 
 __all__ = [
     "FULL_CAR",
     "AbstractCleaning",
+    "AbstractSmoothable",
     "AsItIs",
     "Need",
     "answer",
@@ -26,6 +23,7 @@ __all__ = [
     "keys_asked",
     "method_of",
     "model_of",
+    "smooth_rows",
     "spans_of",
     "start_of",
 ]

@@ -13,7 +13,7 @@ from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_from_zero, number_of
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.method import AbstractSmoothable, answer
 from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
 from jaxveh.estimators.steer_agreement import AgreementMemory, SteerAgreement, agreement_of
 from jaxveh.io import CarSpecification
@@ -58,7 +58,7 @@ class Memory(NamedTuple):
     agreement: AgreementMemory | None
 
 
-class Leaning(AbstractMethod):
+class Leaning(AbstractSmoothable):
     """Bank, roll and the offsets of the sensors that measure them, by an extended Kalman filter (small angles):
 
         d v_y = f_y - g bank - v_x r,    f_y = a_y - a_y_bias - g body_roll,    r = yaw_rate - yaw_rate_bias
@@ -123,13 +123,18 @@ class Leaning(AbstractMethod):
         }  # fmt: skip
         belief = belief_of(State, {"a_y_bias": self.a_y_offset}, stds, t)
         agreement = None if self.steering is None else self.steering.start(t)
-        return self._answer(Memory(motion, self._measured(belief, heard, agreement), agreement), heard)
+        memory = Memory(motion, self._measured(belief, heard, agreement), agreement)
+        return memory, self.say(memory)
 
     def next(self, memory, t, values):
         motion, heard = self.motion.next(memory.motion, t, values)
         agreement = None if self.steering is None else self.steering.next(memory.agreement, values, heard)
         belief = self._measured(self._ahead(memory.belief, heard), heard, agreement)
-        return self._answer(Memory(motion, belief, agreement), heard)
+        memory = Memory(motion, belief, agreement)
+        return memory, self.say(memory)
+
+    def ahead(self, memory, t, values):
+        return self._ahead(memory.belief, self.motion.next(memory.motion, t, values)[1])
 
     def _ahead(self, belief: Belief, heard) -> Belief:
         dt = heard["dt"]
@@ -211,10 +216,10 @@ class Leaning(AbstractMethod):
         belief = correct(belief, course, jnp.square(self.across / fast), satellites & (v_x > 1.0), State, 3.0)
         return correct(belief, rolling, jnp.square(self.roll_rate_noise), gyroscope, State)
 
-    def _answer(self, memory: Memory, heard):
-        belief = memory.belief
+    def say(self, memory):
+        motion, belief = memory.motion, memory.belief
         x = State(*belief.mean)
-        forgets = self._passing(heard["v_x"]) / self.bank_length
+        forgets = self._passing(motion.v_x) / self.bank_length
         wide = lambda *names: spread_of(belief, dict.fromkeys(names, 1.0), State)
         said = {
             "bank": x.bank,
@@ -225,10 +230,10 @@ class Leaning(AbstractMethod):
         }
         sums = {"roll": ("bank", "body_roll"), "roll_rate": ("bank_rate", "body_roll_rate")}
         stds = {name: wide(*sums.get(name, (name,))) for name in said}
-        there = heard["silence"] < SILENCE
+        there = jnp.maximum(motion.silence, motion.speed_silence) < SILENCE
         widest = {"bank": WIDEST, "roll": WIDEST, "body_roll": WIDEST, "roll_rate": 6.0 * WIDEST}
         known = {name: there & (stds[name] < widest.get(name, jnp.inf)) for name in said}
-        return memory, answer(said, stds, known)
+        return answer(said, stds, known)
 
 
 def leaning_filter(car: CarSpecification, who: str, **options: Any) -> Leaning:

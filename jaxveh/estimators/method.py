@@ -9,7 +9,7 @@ A quantity is a module of `jaxveh.estimators`. It has, in addition to what its c
 - `METHODS`: `MethodOfCar` by name. `RECOMMENDED`: the name of the recommended one.
 - `do_nothing(car, recording)`: the answer without any method, (T,) by the names of `SHOWN`.
 - `estimate(source, recording, *, method=...)` and `live(source, *, method=...)`; `source` is a car's file, or a method with
-  numbers of one's own.
+  numbers of one's own. If one of its methods is an `AbstractSmoothable`, `estimate` has `smoothed=False`, too.
 """
 
 from __future__ import annotations
@@ -23,12 +23,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_one_of, is_concrete
+from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.estimated import Estimated
 from jaxveh._core.names import record
-from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result, code
-from jaxveh.estimators.contract import Need, check_needs
+from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning, AsItIs
 from jaxveh.io import CarSpecification
 from jaxveh.io import kit as io
@@ -65,6 +64,23 @@ class AbstractMethod(eqx.Module):
     @abc.abstractmethod
     def next(self, memory: Any, t: Any, values: dict[str, Any]) -> tuple[Any, Answer]:
         """The same for the next row."""
+
+
+class AbstractSmoothable(AbstractMethod):
+    """A method whose memory, a NamedTuple, has a `belief` about its states, a `sequential.Belief` with mean (n,) and covariance
+    (n, n): along a log it can also look back from later rows (`follow` with `smoothed=True`).
+
+    A row's belief is that of `ahead`, corrected by what the row measures; its answer is `say(memory)`.
+    """
+
+    @abc.abstractmethod
+    def ahead(self, memory: Any, t: Any, values: dict[str, Any]) -> Any:
+        """The belief before the measurements of the next row, given the memory after the last: its covariance is
+        `F P F^T + Q`, with the slope F of its mean."""
+
+    @abc.abstractmethod
+    def say(self, memory: Any) -> Answer:
+        """The answer to the row of this memory, by the belief in it."""
 
 
 class MethodOfCar(NamedTuple):
@@ -176,53 +192,10 @@ def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: s
     return method
 
 
-def follow(who: str, method: AbstractMethod, recording: Recording) -> Answers:
-    """A method's answers to all rows of a log, in one scan; compiled once for each kind of method and length.
-
-    **Raises** `InputError` for channels that are missing, in other units, infinite, or not known in every row where they must
-    be.
-    """
-    there = [need for need in method.needs if not need.optional or need.channel in recording]
-    check_needs(who, tuple(need._replace(optional=False) for need in there), recording)
-    for need in there:
-        _check_finite(who, need.channel, recording)
-    dtype, time = _dtype(method), recording.time
-    if isinstance(time, np.ndarray) and dtype != np.float64:
-        time = time - time[0]
-    none = jnp.full(len(recording), jnp.nan, dtype)
-    values = {need.channel: none for need in method.needs}
-    values |= {need.channel: jnp.asarray(recording[need.channel]).astype(dtype) for need in there}
-    said = follow_rows(method, jnp.asarray(time).astype(dtype), values)
-    return Answers(recording.time, said.mean, said.std, said.known, said.result)
-
-
-def _dtype(method: AbstractMethod) -> Any:
+def dtype_of(method: AbstractMethod) -> Any:
     """The dtype of the method's numbers; if it has none, the default dtype."""
     leaves = jax.tree.leaves(eqx.filter(method, eqx.is_inexact_array))
     return jnp.result_type(*leaves) if leaves else jax.dtypes.canonicalize_dtype(float)
-
-
-def _check_finite(who: str, name: str, recording: Recording) -> None:
-    if not is_concrete(recording[name]):
-        return
-    infinite = np.isinf(np.asarray(recording[name]))
-    if infinite.any():
-        raise InputError(
-            f"{who}: channel {name} is infinite at t = {np.asarray(recording.time)[np.argmax(infinite)]:g} s: must be finite, or "
-            "NaN where nothing was measured."
-        )
-
-
-@eqx.filter_jit
-def follow_rows(method: AbstractMethod, time: Any, values: dict[str, Any]) -> Answer:
-    """The compiled part of `follow`, for (T,) arrays; steps are checkpointed, so that long logs can be differentiated."""
-    take = lambda rows: jax.tree.map(lambda leaf: leaf[rows], (time, values))
-    start, rest = take(0), take(slice(1, None))
-    memory, said = apart(method.first, start[0], *start)
-    # The memory has the same types after each row as after the first.
-    body = jax.checkpoint(lambda memory, row: apart(method.next, row[0], memory, *row))
-    _, later = jax.lax.scan(body, memory, rest)
-    return jax.tree.map(lambda a, b: jnp.concatenate([jnp.asarray(a)[None], b]), said, later)
 
 
 class LiveMethod(eqx.Module):
@@ -253,7 +226,7 @@ class LiveMethod(eqx.Module):
         if missing:
             raise InputError(f"row: no value for {', '.join(missing)}.")
         numbers = [channels.get(need.channel, np.nan) for need in needs]
-        t, *values = kit.scalar_row(t, numbers, _dtype(self.method))
+        t, *values = kit.scalar_row(t, numbers, dtype_of(self.method))
         return t, dict(zip([need.channel for need in needs], values, strict=True))
 
 

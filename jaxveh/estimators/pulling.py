@@ -16,7 +16,7 @@ from jaxveh.estimators import mass_and_grade
 from jaxveh.estimators.body_motion import SILENCE, SPEEDS, BodyMotion, away_from_zero, driven_share, hold, number_of
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning
-from jaxveh.estimators.method import AbstractMethod, Filtered, answer
+from jaxveh.estimators.method import AbstractSmoothable, Filtered, answer
 from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
 from jaxveh.estimators.sliding import Sliding
 from jaxveh.filters import Extended
@@ -59,7 +59,7 @@ class PullingMemory(NamedTuple):
     belief: Belief
 
 
-class Pulling(AbstractMethod):
+class Pulling(AbstractSmoothable):
     """Grade, mass and the accelerometer's offset, by an extended Kalman filter:
 
         d v_x = f_x + v_y r - g sin(grade),    f_x = (a_x - a_x_bias) / (1 + g pitch_gradient)
@@ -71,7 +71,8 @@ class Pulling(AbstractMethod):
     is a further state, with a standard deviation (`rolling_spread`) that limits how well the offset can be known. Wheels that
     brake or drive slip (`slip` of the speed per m/s^2, also a state). Grades change with distance (`grade_length`,
     `grade_edge`). A climb rate from satellites measures the grade directly, `v_x sin(grade)`, with a delay (H. Bae, J. Ryu,
-    J. Gerdes 2001). Brake torques are assumed correct within a share `brake_doubt`. (A. Vahidi et al. 2005 and P. Lingman, B.
+    J. Gerdes 2001). Made from a car's file it hears the wheels also where a log has a `v_x`: one that is estimated from them is
+    late on hills. Brake torques are assumed correct within a share `brake_doubt`. (A. Vahidi et al. 2005 and P. Lingman, B.
     Schmidtbauer 2003, with an accelerometer and its offset.)
 
     **Parameters**: of the car `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2), `drag` (N s^2/m^2),
@@ -127,14 +128,24 @@ class Pulling(AbstractMethod):
         }  # fmt: skip
         belief = belief_of(State, {"v_x": heard["v_x"], "a_x_bias": self.a_x_offset, "slip": self.slip}, stds, t)
         slides = self.sliding.start(t)
-        return self._answer(motion, slides, self._measured(belief, slides.doubt, heard, values), heard)
+        memory = PullingMemory(motion, slides, self._measured(belief, slides.doubt, heard, values))
+        return memory, self.say(memory)
 
     def next(self, memory, t, values):
+        motion, slides, heard = self._hear(memory, t, values)
+        belief = self._ahead(memory.belief, slides.doubt, heard)
+        memory = PullingMemory(motion, slides, self._measured(belief, slides.doubt, heard, values))
+        return memory, self.say(memory)
+
+    def ahead(self, memory, t, values):
+        _, slides, heard = self._hear(memory, t, values)
+        return self._ahead(memory.belief, slides.doubt, heard)
+
+    def _hear(self, memory, t, values):
+        """The motion, whether the car slides, and the completed row."""
         motion, heard = self.motion.next(memory.motion, t, values)
         v_x = State(*memory.belief.mean).v_x
-        slides = self.sliding.next(memory.slides, heard, v_x, self._rolls_across(v_x, heard), self.wheelbase)
-        belief = self._ahead(memory.belief, slides.doubt, heard)
-        return self._answer(motion, slides, self._measured(belief, slides.doubt, heard, values), heard)
+        return motion, self.sliding.next(memory.slides, heard, v_x, self._rolls_across(v_x, heard), self.wheelbase), heard
 
     def _ahead(self, belief: Belief, doubt, heard) -> Belief:
         dt = heard["dt"]
@@ -203,7 +214,7 @@ class Pulling(AbstractMethod):
         slowing = brake / (self.wheel_radius * self.mass)
         # All wheels brake; in a car that drives both axles, the wheels that give the speed are driven, too.
         pushing = drive * 2.0 * driven_share(self.motion.front_share) / (self.wheel_radius * self.mass)
-        noise = jnp.where(jnp.isnan(values["v_x"]), self.wheel_noise, self.told_noise)
+        noise = jnp.where(heard["speed_told"], self.told_noise, self.wheel_noise)
         slips = jnp.square(noise) + jnp.square(0.002 * v_x * (slowing + pushing))
         slips = slips + 2.0 * self.sliding.staying / dt * jnp.square(slides.along)
         doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
@@ -225,7 +236,8 @@ class Pulling(AbstractMethod):
         there = (heard["pull_silence"] < SILENCE) & (v_x > SLOWEST)
         return correct(belief, balance, lasting, pushed & there, State, 3.0)
 
-    def _answer(self, motion, slides, belief, heard):
+    def say(self, memory):
+        motion, belief = memory.motion, memory.belief
         x = State(*belief.mean)
         wide = {name: spread_of(belief, {name: 1.0}, State) for name in State._fields}
         mass = self.mass * jnp.exp(x.log_mass)
@@ -236,9 +248,9 @@ class Pulling(AbstractMethod):
             "v_x": wide["v_x"],
             "a_x_bias": wide["a_x_bias"],
         }
-        there = heard["pull_silence"] < SILENCE
+        there = jnp.maximum(motion.pull_silence, motion.speed_silence) < SILENCE
         known = {"grade": there & (wide["grade"] < WIDEST), "mass": wide["log_mass"] < WIDEST_MASS, "v_x": there}
-        return PullingMemory(motion, slides, belief), answer(said, stds, known)
+        return answer(said, stds, known)
 
 
 def pulling_filter(car: CarSpecification, who: str, **options: Any) -> Pulling:
@@ -248,7 +260,7 @@ def pulling_filter(car: CarSpecification, who: str, **options: Any) -> Pulling:
     stiffness = car.rear_cornering_stiffness
     compliance = 0.0 if stiffness is None else car.mass * car.front_axle_to_cg / (car.wheelbase * stiffness)
     return Pulling(
-        BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive),
+        BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive, wheels_first=True),
         mass=car.mass,
         wheel_radius=number_of(car, "wheel_radius", who, "m"),
         rear_axle_to_cg=car.rear_axle_to_cg,

@@ -25,7 +25,8 @@ from jaxveh.estimators.contract import Calibration, Need, Span, check_needs, mod
 from jaxveh.estimators.front_axle import front_axle
 from jaxveh.estimators.linear_baseline import do_nothing
 from jaxveh.estimators.live import Live
-from jaxveh.estimators.method import AbstractMethod, Answers, LiveMethod, follow, method_of
+from jaxveh.estimators.following import follow
+from jaxveh.estimators.method import AbstractMethod, Answers, LiveMethod, method_of
 from jaxveh.estimators.parameter_bands import Members, estimate_with_members, members_of_fit, members_of_prior
 from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle

@@ -24,7 +24,8 @@ from jaxveh.estimators.friction.scalar import Follower
 from jaxveh.estimators.friction.slipping_wheels import SidesApart, WheelObserver
 from jaxveh.estimators.friction.stiffness_doubt import with_doubt
 from jaxveh.estimators.friction.wheels import Reconstruction, SlipSlope, WheelSlips
-from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.estimators.following import follow
+from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
 from jaxveh.io import CarSpecification
 from jaxveh.tyres import LuGre
 

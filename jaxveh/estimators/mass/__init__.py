@@ -14,7 +14,8 @@ import numpy as np
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.mass.forgetting import forgetting_factors
 from jaxveh.estimators.mass.ratios import gated_ratios, high_pass_of, kinematic_of
-from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.estimators.following import follow
+from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
 from jaxveh.estimators.pulling import joint_filter, pulling_filter
 from jaxveh.io import CarSpecification
 
@@ -64,9 +65,10 @@ def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndar
     return dict.fromkeys(SHOWN, np.full(len(recording), car.mass))
 
 
-def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
-    """Mass (kg) along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. **Raises** as `follow`."""
-    return follow(NAME, method_of(NAME, METHODS, source, method), recording)
+def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED, smoothed: bool = False) -> Answers:
+    """Mass (kg) along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. `smoothed`: each
+    row is estimated from all rows. **Raises** as `follow`."""
+    return follow(NAME, method_of(NAME, METHODS, source, method), recording, smoothed=smoothed)
 
 
 def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:

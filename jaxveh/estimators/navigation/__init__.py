@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.estimators.following import follow
+from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
 from jaxveh.estimators.navigation.method import Navigation, navigation_model
 from jaxveh.estimators.navigation.multi_rate import multi_rate_of
 from jaxveh.estimators.navigation.of_car import navigation, navigation_of

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.estimators.following import follow
+from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
 from jaxveh.estimators.speed.abs_peaks import AdaptiveNonlinear
 from jaxveh.estimators.speed.accelerometer import AccelerometerIntegral
 from jaxveh.estimators.speed.car_numbers import FORCE_KEYS, keys_of, speed_car

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.method import AbstractSmoothable, answer
 from jaxveh.estimators.sequential import Belief, innovation, update
 from jaxveh.estimators.stiffness.single_track import LATERAL, LEAN, LOWEST, Followed, LinearCar, Signals
 
@@ -30,7 +30,7 @@ class WalkMemory(NamedTuple):
     turning: Any
 
 
-class WalkingStiffness(AbstractMethod):
+class WalkingStiffness(AbstractSmoothable):
     """An extended Kalman filter of [v_y, yaw rate, ln C_f, ln C_r, offsets of steer, a_y and yaw rate, lean, yaw, delay].
 
     The model is the linear single track with the file's mass, inertia and lengths. The measurements are yaw rate, lateral
@@ -69,15 +69,14 @@ class WalkingStiffness(AbstractMethod):
         signals = self.followed.start(t, values)
         mean = jnp.zeros((STATES,), self.spread.dtype).at[7].set(LEAN)
         memory = WalkMemory(signals, Belief(mean, self._start()), jnp.zeros_like(t))
-        return memory, self._answer(memory)
+        return memory, self.say(memory)
 
     def next(self, memory, t, values):
-        dt = jnp.clip(t - memory.signals.t, 0.0, 1.0)
-        now = self.followed.next(memory.signals, t, values)
+        dt, now = self._hear(memory, t, values)
         v_x = jnp.maximum(now.v_x, LOWEST)
         share = 1.0 - jnp.exp(-2.0 * dt / self.course_delay)
         turning = memory.turning + share * (now.a_y / (1.0 + LEAN) / v_x - memory.turning)
-        belief = self._move(memory.belief, now, dt)
+        start = belief = self.ahead(memory, t, values)
         rough = 1.0 + jnp.square(jnp.square(now.a_y / self.linear))
         heard = lambda belief, value, expect, noise: update(
             belief, innovation(belief, expect, value, jnp.square(noise) * rough)
@@ -89,10 +88,18 @@ class WalkingStiffness(AbstractMethod):
         ahead = seen(belief.mean)
         late = values["course"] + self.course_delay * turning
         belief = heard(belief, ahead + numerics.wrap_angle(late - ahead), seen, self.course_noise / v_x)
-        x = jnp.where(now.moves, belief.mean, memory.belief.mean.at[:2].set(0.0))
-        P = jnp.where(now.moves, belief.covariance, self._standing(memory.belief.covariance))
-        after = WalkMemory(now, Belief(x, P), turning)
-        return after, self._answer(after)
+        after = WalkMemory(now, jax.tree.map(lambda a, b: jnp.where(now.moves, a, b), belief, start), turning)
+        return after, self.say(after)
+
+    def ahead(self, memory, t, values):
+        dt, now = self._hear(memory, t, values)
+        mean, covariance = memory.belief
+        moved, stood = self._move(memory.belief, now, dt), Belief(mean.at[:2].set(0.0), self._standing(covariance))
+        return jax.tree.map(lambda a, b: jnp.where(now.moves, a, b), moved, stood)
+
+    def _hear(self, memory, t, values):
+        """The time since the last row (s), at most one second, and the signals of this row."""
+        return jnp.clip(t - memory.signals.t, 0.0, 1.0), self.followed.next(memory.signals, t, values)
 
     def _start(self):
         soft = self.spread
@@ -137,7 +144,7 @@ class WalkingStiffness(AbstractMethod):
         moved = x.at[:2].add(dt * (inverse @ rate)).at[8].add(dt * x[1])
         return Belief(moved, step @ belief.covariance @ step.T + jnp.diag(jnp.square(walks) * dt))
 
-    def _answer(self, memory: WalkMemory):
+    def say(self, memory):
         now, (x, P), _ = memory
         std = jnp.sqrt(jnp.diagonal(P))[2:4]
         file = (self.car.front_cornering_stiffness, self.car.rear_cornering_stiffness)

@@ -63,7 +63,7 @@ def channels_kept() -> tuple[str, ...]:
         for one in module.METHODS.values():
             with contextlib.suppress(InputError):
                 read |= {need.channel for need in one.make(told_cars()[0]).needs}
-    return tuple(sorted(shown | read | {"true.v_x", "true.sideslip"}))
+    return tuple(sorted(shown | read | {"true.v_x", *LEANS}))
 
 
 def chapter_drives(
@@ -143,7 +143,7 @@ def race_methods(
 
 def _data(module: ModuleType, method: AbstractMethod, drives: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     wanted = {need.channel for need in method.needs} | {f"true.{name}" for name in module.SHOWN}
-    wanted |= {"car", "true.v_x", "true.sideslip"}
+    wanted |= {"car", "true.v_x", *LEANS}
     return {name: drives[name] for name in sorted(wanted) if name in drives}
 
 
@@ -186,11 +186,13 @@ WARM_UP = 5.0
 LOST = np.radians(20.0)
 """rad of sideslip, or of roll: from there on a car has spun or tipped over, and the rest of the drive is not scored."""
 
+LEANS = ("true.sideslip", "true.roll")
+
 
 def held_rows(drive: Mapping[str, Any]) -> Any:
     """The rows (..., T) up to the one in which the driver loses the car."""
-    leans = jnp.maximum(jnp.abs(drive["true.sideslip"]), jnp.abs(drive["true.roll"]))
-    return jnp.cumprod((leans < LOST).astype(int), axis=-1) > 0
+    furthest = functools.reduce(jnp.maximum, [jnp.abs(drive[name]) for name in LEANS])
+    return jnp.cumprod((furthest < LOST).astype(int), axis=-1) > 0
 
 
 def metrics(mean, std, known, truth, held) -> dict[str, Any]:

@@ -1,0 +1,123 @@
+"""A method's answers along a log: looking back only, as a car would give them, or smoothed by all rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, is_concrete
+from jaxveh._core.recording import Recording
+from jaxveh.estimators.contract import check_needs
+from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable, Answer, Answers, dtype_of
+from jaxveh.estimators.sequential import Belief
+from jaxveh.numerics import apart
+
+
+LITTLE = 1e3
+"""Epsilons that a correlation of 1 is increased by: rounding leaves less."""
+
+
+def follow(who: str, method: AbstractMethod, recording: Recording, *, smoothed: bool = False) -> Answers:
+    """A method's answers to all rows of a log; compiled once for each kind of method and length. Each answer looks back only;
+    with `smoothed` it uses all rows (`smooth_rows`).
+
+    **Raises** `InputError` for channels that are missing, in other units, infinite, or not known in every row where they must
+    be, and for a method that cannot be smoothed.
+    """
+    if smoothed and not isinstance(method, AbstractSmoothable):
+        raise InputError(
+            f"{who}: smoothed: {type(method).__name__} looks back only. Leave smoothed out, or take a method that is a "
+            "kit.AbstractSmoothable."
+        )
+    there = [need for need in method.needs if not need.optional or need.channel in recording]
+    check_needs(who, tuple(need._replace(optional=False) for need in there), recording)
+    for need in there:
+        _check_finite(who, need.channel, recording)
+    dtype, time = dtype_of(method), recording.time
+    if isinstance(time, np.ndarray) and dtype != np.float64:
+        time = time - time[0]
+    none = jnp.full(len(recording), jnp.nan, dtype)
+    values = {need.channel: none for need in method.needs}
+    values |= {need.channel: jnp.asarray(recording[need.channel]).astype(dtype) for need in there}
+    said = (smooth_rows if smoothed else follow_rows)(method, jnp.asarray(time).astype(dtype), values)
+    return Answers(recording.time, said.mean, said.std, said.known, said.result)
+
+
+def _check_finite(who: str, name: str, recording: Recording) -> None:
+    if not is_concrete(recording[name]):
+        return
+    infinite = np.isinf(np.asarray(recording[name]))
+    if infinite.any():
+        raise InputError(
+            f"{who}: channel {name} is infinite at t = {np.asarray(recording.time)[np.argmax(infinite)]:g} s: must be finite, or "
+            "NaN where nothing was measured."
+        )
+
+
+@eqx.filter_jit
+def follow_rows(method: AbstractMethod, time: Any, values: dict[str, Any]) -> Answer:
+    """The compiled part of `follow`, for (T,) arrays; steps are checkpointed, so that long logs can be differentiated."""
+    take = lambda rows: jax.tree.map(lambda leaf: leaf[rows], (time, values))
+    start, rest = take(0), take(slice(1, None))
+    memory, said = apart(method.first, start[0], *start)
+    # The memory has the same types after each row as after the first.
+    body = jax.checkpoint(lambda memory, row: apart(method.next, row[0], memory, *row))
+    _, later = jax.lax.scan(body, memory, rest)
+    return jax.tree.map(lambda a, b: jnp.concatenate([jnp.asarray(a)[None], b]), said, later)
+
+
+@eqx.filter_jit
+def smooth_rows(method: AbstractSmoothable, time: Any, values: dict[str, Any]) -> Answer:
+    """`follow_rows`, but each answer uses all rows: the smoother of H. Rauch, F. Tung, C. Striebel (1965), extended, with the
+    slopes at the filter's means (Sarkka 2013, sec. 9.1). What the memory holds beside the belief looks back only."""
+    take = lambda rows: jax.tree.map(lambda leaf: leaf[rows], (time, values))
+    start, rest = take(0), take(slice(1, None))
+    first, _ = apart(method.first, start[0], *start)
+
+    def forward(memory, row):
+        memory, _ = apart(method.next, row[0], memory, *row)
+        return memory, memory
+
+    def back(later, step):
+        memory, row = step
+        belief = apart(_given_later, row[0], method, memory, *row, later)
+        return belief, memory._replace(belief=belief)
+
+    last, memories = jax.lax.scan(jax.checkpoint(forward), first, rest)
+    before = jax.tree.map(lambda one, more: jnp.concatenate([jnp.asarray(one)[None], more])[:-1], first, memories)
+    _, smoothed = jax.lax.scan(jax.checkpoint(back), last.belief, (before, rest), reverse=True)
+    said, end = jax.vmap(method.say)(smoothed), method.say(last)
+    return jax.tree.map(lambda a, b: jnp.concatenate([a, jnp.asarray(b)[None]]), said, end)
+
+
+def _given_later(method: AbstractSmoothable, memory: Any, t: Any, values: dict[str, Any], later: Belief) -> Belief:
+    """The belief of a row, given the smoothed belief `later` of the next row, which has these values."""
+    mean, covariance = memory.belief
+    ahead = lambda mean, covariance: method.ahead(memory._replace(belief=Belief(mean, covariance)), t, values)
+    slope = jax.jacfwd(lambda mean: ahead(mean, covariance).mean)(mean)
+    predicted, noise = ahead(mean, covariance), ahead(mean, jnp.zeros_like(covariance)).covariance
+    gain = _solve(predicted.covariance, slope @ covariance).T
+    # As Joseph's form, positive however large the differences are.
+    left = jnp.eye(mean.shape[0], dtype=mean.dtype) - gain @ slope
+    spread = left @ covariance @ left.T + gain @ (later.covariance + noise) @ gain.T
+    return Belief(mean + gain @ (later.mean - predicted.mean), numerics.symmetric(spread))
+
+
+def _solve(covariance: Any, b: Any) -> Any:
+    """The solution X of `covariance X = b`; states may have no variance, or depend on each other.
+
+    A little is added to the diagonal of the correlations, so that they have a factor; two refinements take its effect out again.
+    """
+    size = jnp.diagonal(covariance)
+    scale = jnp.where(size > 0.0, 1.0 / numerics.sqrt(jnp.where(size > 0.0, size, 1.0)), 0.0)[:, None]
+    correlations, b = scale * covariance * scale.T, scale * b
+    factor = numerics.cholesky(correlations + LITTLE * jnp.finfo(size.dtype).eps * jnp.eye(len(size), dtype=size.dtype))
+    found = numerics.solve_psd(factor, b)
+    for _ in range(2):
+        found = found + numerics.solve_psd(factor, b - correlations @ found)
+    return scale * found
