@@ -103,6 +103,7 @@ def estimate(
     anyway: options.Anyway = False,
     what: quantity_options.What = sideslip.NAME,
     methods: quantity_options.Methods = None,
+    live: quantity_options.Live = False,
     list_methods: quantity_options.Listed = False,
 ) -> None:
     """Estimate what a car cannot measure along its logs: sideslip, slip and forces, or another quantity (--what).
@@ -130,7 +131,7 @@ def estimate(
     del list_methods
     choice = Choice(
         logs, product, vehicle, calibration, channels, span, calibrate, tuple(calibrate_on or ()), as_told, fill, truth,
-        filter, particles, seed, out, report, force, anyway,
+        filter, particles, seed, out, report, force, anyway, live,
     )  # fmt: skip
     by_methods = quantities.quantities_asked(choice, what, methods)
     if by_methods is None:
@@ -172,6 +173,7 @@ class Choice(NamedTuple):
     report: Path | None
     force: bool
     anyway: bool
+    live: bool
 
 
 def _estimate(choice: Choice) -> tuple[Any, dict[str, Any]]:
@@ -193,8 +195,8 @@ def _estimate(choice: Choice) -> tuple[Any, dict[str, Any]]:
             found = sideslip.calibrate(car, fitted_on, choice.calibrate_on, report)
             found = found.with_log_names(*(log.name for log in choice.logs))
         report(0, 1, "estimating (compiling first)")
-        kind, particles, seed = choice.filter.value, choice.particles, choice.seed
-        estimates = [sideslip.estimate(found or car, job.parts.estimate, kind, particles, seed) for job in jobs]
+        how = (choice.filter.value, choice.particles, choice.seed, not choice.live)
+        estimates = [sideslip.estimate(found or car, job.parts.estimate, *how) for job in jobs]
         report(1, 1, "scoring")
     _say_source(choice, found, reason)
     numbers = [_conclude(choice, job, one, found, car) for job, one in zip(jobs, estimates, strict=True)]

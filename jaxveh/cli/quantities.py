@@ -46,6 +46,7 @@ class Asked(NamedTuple):
     out: Path | None
     force: bool
     anyway: bool
+    live: bool
 
 
 class Shown(NamedTuple):
@@ -89,6 +90,7 @@ def quantities_asked(choice: Any, what: str, methods: str | None) -> Asked | Non
     return Asked(
         choice.logs, choice.product, choice.vehicle, choice.channels, choice.span, choice.fill, quantities,
         methods_of(methods, quantities), choice.truth, choice.out, choice.force, choice.anyway,
+        choice.live,
     )  # fmt: skip
 
 
@@ -177,11 +179,11 @@ def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, seen: Record
     With several quantities, one that the log does not allow is listed as refused; a single quantity raises.
     """
     if asked.methods is None and len(asked.what) > 1:
-        compared = _recommended(quantity, car, seen)
-    elif asked.methods is not None and set(asked.methods) == set(quantity.METHODS):
-        compared = estimators.compare(car, seen, quantity)
+        compared = _recommended(quantity, car, seen, not asked.live)
     else:
-        compared = estimators.compare(car, seen, quantity, asked.methods or [quantity.RECOMMENDED])
+        every = asked.methods is not None and set(asked.methods) == set(quantity.METHODS)
+        methods = None if every else asked.methods or [quantity.RECOMMENDED]
+        compared = estimators.compare(car, seen, quantity, methods, smoothed=not asked.live)
     if asked.truth is None or asked.truth.removeprefix(TRUTH) not in quantity.SHOWN:
         return Shown(compared, {}, {})
     name = asked.truth.removeprefix(TRUTH)
@@ -193,10 +195,10 @@ def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, seen: Record
     return Shown(compared, scores, nothing)
 
 
-def _recommended(quantity: ModuleType, car: CarSpecification, seen: Recording) -> Compared:
+def _recommended(quantity: ModuleType, car: CarSpecification, seen: Recording, smoothed: bool) -> Compared:
     """Run the recommended method, or record the reason why it cannot run."""
     try:
-        return estimators.compare(car, seen, quantity, [quantity.RECOMMENDED])
+        return estimators.compare(car, seen, quantity, [quantity.RECOMMENDED], smoothed=smoothed)
     except InputError as error:
         return Compared({}, {quantity.RECOMMENDED: str(error)}, {})
 
@@ -230,16 +232,18 @@ def _print(log: Path, found: dict[str, Shown]) -> None:
                     np.asarray(getattr(part, name)) for part in (answers.mean, answers.std, answers.known)
                 )
                 score = shown.scores.get(method, {}).get(name)
+                looks = "all" if method in shown.compared.smoothed else "up to it"
                 rows.append((
-                    method, f"{name} [{unit}]", spread(mean[-1], std[-1]), f"{100.0 * known.mean():.0f} %",
+                    method, looks, f"{name} [{unit}]", spread(mean[-1], std[-1]), f"{100.0 * known.mean():.0f} %",
                     number(shown.compared.microseconds[method], 3), *_cells(score),
                 ))  # fmt: skip
         rows += [
-            (NOTHING, f"{n} [{module.SHOWN[n]}]", "-", "-", "-", number(e), "-", "-", "-", "-")
+            (NOTHING, "-", f"{n} [{module.SHOWN[n]}]", "-", "-", "-", number(e), "-", "-", "-", "-")
             for n, e in shown.nothing.items()
         ]
         columns = (
             "method",
+            "uses rows",
             "what",
             "at the end",
             "known",
@@ -250,9 +254,9 @@ def _print(log: Path, found: dict[str, Shown]) -> None:
             "delay [s]",
             "in 95 %",
         )
-        width = len(columns) if shown.scores else 5
+        width = len(columns) if shown.scores else 6
         if rows:
-            table(f"{quantity} along {log.name}", columns[:width], [row[:width] for row in rows], left=2)
+            table(f"{quantity} along {log.name}", columns[:width], [row[:width] for row in rows], left=3)
         for method, reason in shown.compared.refused.items():
             results().print(f"{quantity}, {method}: not taken. {reason}", markup=False, soft_wrap=True)
 
@@ -302,7 +306,7 @@ def _numbers(shown: Shown) -> dict[str, Any]:
     }
     return {
         "at_the_end": ends, "scores": scores, "nothing_done_rmse": shown.nothing, "refused": shown.compared.refused,
-        "microseconds_a_step": shown.compared.microseconds,
+        "microseconds_a_step": shown.compared.microseconds, "smoothed": shown.compared.smoothed,
     }  # fmt: skip
 
 

@@ -53,6 +53,15 @@ Methods = Annotated[
     ),
 ]
 
+Live = Annotated[
+    bool,
+    typer.Option(
+        "--live",
+        help="Estimate each row from the rows up to it, as in a car. By default each row is estimated from all rows, if the method "
+        "can be smoothed.",
+    ),
+]
+
 Listed = Annotated[
     bool,
     typer.Option("--list", help="Print the methods of each quantity, and stop.", is_eager=True, callback=print_methods),

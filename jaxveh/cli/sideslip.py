@@ -71,9 +71,11 @@ def estimate(
     kind: str = "ekf",
     particles: int = 1000,
     seed: int = 0,
+    smoothed: bool = True,
 ) -> filters.Estimate | filters.SmoothedEstimate:
     """Estimate the states along the rows of `part`, with a calibration or with the values of a car file."""
-    return sideslip.estimate(source, part, filter=filter_of(kind, particles), key=jax.random.key(seed))
+    filter = filter_of(kind, particles)
+    return sideslip.estimate(source, part, filter=filter, key=jax.random.key(seed), smoothed=smoothed)
 
 
 def least_speed_of(car: CarSpecification) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from types import ModuleType
 
 from jaxveh._core.errors import InputError
-from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.method import AbstractSmoothable, MethodOfCar
 from jaxveh.io import AxleTyre, CarSpecification
 
 FULL_CAR = CarSpecification(
@@ -51,11 +51,13 @@ def _made(method: MethodOfCar, car: CarSpecification) -> bool:
 
 
 def _row(name: str, method: MethodOfCar, module: ModuleType) -> str:
-    needs = method.make(FULL_CAR).needs
+    made = method.make(FULL_CAR)
+    needs = made.needs
+    help = f"{method.help} (can be smoothed)" if isinstance(made, AbstractSmoothable) else method.help
     reads = [f"[{need.channel}]" if need.optional else need.channel for need in needs]
     shown = f"**{name}**" if name == module.RECOMMENDED else name
     asked = ", ".join(keys_asked(method)) or "nothing more"
-    return f"| {shown} | {method.help} | {method.source} | {', '.join(_short(reads))} | {asked} |"
+    return f"| {shown} | {help} | {method.source} | {', '.join(_short(reads))} | {asked} |"
 
 
 def _short(channels: list[str]) -> list[str]:

@@ -13,17 +13,18 @@ import numpy as np
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Score, delay, score_band
-from jaxveh.estimators.method import Answers
+from jaxveh.estimators.method import AbstractSmoothable, Answers, method_of
 from jaxveh.io import CarSpecification
 
 
 class Compared(NamedTuple):
     """`answers` by method; `refused`: the reason by method, for those that could not run; `microseconds` per step by method,
-    already compiled, in one scan over the log."""
+    already compiled, in one scan over the log; `smoothed`: the methods whose answers use all rows."""
 
     answers: dict[str, Answers]
     refused: dict[str, str]
     microseconds: dict[str, float]
+    smoothed: tuple[str, ...] = ()
 
 
 class MethodScore(NamedTuple):
@@ -38,9 +39,15 @@ class MethodScore(NamedTuple):
 
 
 def compare(
-    car: CarSpecification, recording: Recording, quantity: ModuleType, methods: Iterable[str] | None = None
+    car: CarSpecification,
+    recording: Recording,
+    quantity: ModuleType,
+    methods: Iterable[str] | None = None,
+    *,
+    smoothed: bool = False,
 ) -> Compared:
-    """Run the methods of a quantity along a log: all of them, or those named in `methods`.
+    """Run the methods of a quantity along a log: all of them, or those named in `methods`. With `smoothed`, each row is estimated
+    from all rows by those methods that can be smoothed, from the rows up to it by the others.
 
     A method that needs a key missing from the car's file or a channel missing from the log is `refused` with the reason. If
     it was named in `methods`, it **raises** `InputError` instead, as does an unknown name.
@@ -50,15 +57,18 @@ def compare(
     for name in names:
         check_one_of(f"{quantity.NAME}: method", name, quantity.METHODS)
         try:
-            compared.answers[name] = quantity.estimate(car, recording, method=name)
+            method = method_of(quantity.NAME, quantity.METHODS, car, name)
+            looks = {"smoothed": True} if smoothed and isinstance(method, AbstractSmoothable) else {}
+            compared.answers[name] = quantity.estimate(method, recording, **looks)
         except InputError as error:
             if methods is not None:
                 raise
             compared.refused[name] = str(error)
             continue
         start = clock.perf_counter()
-        jax.block_until_ready(quantity.estimate(car, recording, method=name).mean)
+        jax.block_until_ready(quantity.estimate(method, recording, **looks).mean)
         compared.microseconds[name] = 1e6 * (clock.perf_counter() - start) / len(recording)
+        compared = compared._replace(smoothed=compared.smoothed + ((name,) if looks else ()))
     return compared
 
 

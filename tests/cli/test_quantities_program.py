@@ -73,6 +73,20 @@ def test_methods_stand_side_by_side_and_are_scored_blind(drive):
     assert (drive / "figs" / "speed.png").stat().st_size > 1000
 
 
+@pytest.mark.parametrize("live", [False, True])
+def test_rows_are_estimated_from_all_rows_unless_as_in_a_car(drive, live):
+    result = estimate(drive, "--what", "stiffness", "--json", drive / "n.json", *(["--live"] if live else []))
+    assert result.exit_code == 0, result.output
+    frame = np.genfromtxt(drive / "found.csv", delimiter=",", names=True, deletechars="")
+    column = next(name for name in frame.dtype.names if name.startswith("front_cornering_stiffness"))
+    log = io.read_recording(drive / "drive.csv")
+    expected = estimators.stiffness.estimate(method_logs.CAR, log, smoothed=not live)
+    np.testing.assert_allclose(frame[column], expected["front_cornering_stiffness"], rtol=1e-12)
+    smoothed = json.loads((drive / "n.json").read_text())["stiffness"]["smoothed"]
+    assert smoothed == ([] if live else ["walking"])
+    assert ("up to it" in result.stdout) == live
+
+
 def test_names_are_taken_once_and_all_of_them_by_all():
     assert names_of("b, a,b", "--what", ("a", "b")) == ("b", "a")
     assert names_of("all", "--what", ("a", "b")) == names_of("b,all", "--what", ("a", "b")) == ("a", "b")
