@@ -57,8 +57,8 @@ Live = Annotated[
     bool,
     typer.Option(
         "--live",
-        help="Estimate each row from the rows up to it, as in a car. By default each row is estimated from all rows, if the method "
-        "can be smoothed.",
+        help="Estimate each row from the rows up to it, as in a car. By default each row is estimated from all rows, if the "
+        "method can be smoothed.",
     ),
 ]
 

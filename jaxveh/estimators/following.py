@@ -17,7 +17,6 @@ from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable, Answer,
 from jaxveh.estimators.sequential import Belief
 from jaxveh.numerics import apart
 
-
 LITTLE = 1e3
 """Epsilons that a correlation of 1 is increased by: rounding leaves less."""
 

@@ -145,7 +145,11 @@ class Pulling(AbstractSmoothable):
         """The motion, whether the car slides, and the completed row."""
         motion, heard = self.motion.next(memory.motion, t, values)
         v_x = State(*memory.belief.mean).v_x
-        return motion, self.sliding.next(memory.slides, heard, v_x, self._rolls_across(v_x, heard), self.wheelbase), heard
+        return (
+            motion,
+            self.sliding.next(memory.slides, heard, v_x, self._rolls_across(v_x, heard), self.wheelbase),
+            heard,
+        )
 
     def _ahead(self, belief: Belief, doubt, heard) -> Belief:
         dt = heard["dt"]

@@ -22,10 +22,10 @@ from jaxveh.estimators.alignment import a_y_delay, on_time
 from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning, clean
 from jaxveh.estimators.coarse_log import coarse_logs
 from jaxveh.estimators.contract import Calibration, Need, Span, check_needs, model_of, spans_of, start_of
+from jaxveh.estimators.following import follow
 from jaxveh.estimators.front_axle import front_axle
 from jaxveh.estimators.linear_baseline import do_nothing
 from jaxveh.estimators.live import Live
-from jaxveh.estimators.following import follow
 from jaxveh.estimators.method import AbstractMethod, Answers, LiveMethod, method_of
 from jaxveh.estimators.parameter_bands import Members, estimate_with_members, members_of_fit, members_of_prior
 from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model

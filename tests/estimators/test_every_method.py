@@ -1,5 +1,6 @@
 """Every method of every quantity keeps the contract of `estimators.method`: from what `estimators.__all__` lists."""
 
+import dataclasses
 import inspect
 from types import ModuleType
 
@@ -117,6 +118,26 @@ def test_an_answer_is_finite_or_not_known_whatever_the_log_lacks(quantity, name)
     plain = list(logs).index("plain")
     known = any(np.asarray(getattr(said.known, field))[plain].any() for field in module.SHOWN)
     assert known or "known only" in module.METHODS[name].help
+
+
+READ_STEER = [
+    case(quantity, name)
+    for quantity, module in QUANTITIES.items()
+    for name in module.METHODS
+    if "steer" in {need.channel for need in made(quantity, name).needs}
+]
+
+
+@a_sixth
+@pytest.mark.parametrize(("quantity", "name"), READ_STEER)
+def test_the_offset_of_the_steer_in_the_car_s_file_is_taken_out(quantity, name):
+    module, log = QUANTITIES[quantity], method_logs.log(made(quantity, name).needs)
+    log = log.rows(slice(0, 100))
+    right, off = (dataclasses.replace(method_logs.CAR, steer_offset=offset) for offset in (0.0, 0.01))
+    found = module.estimate(off, log.replace(steer=np.asarray(log["steer"]) + 0.01), method=name)
+    same = module.estimate(right, log, method=name)
+    for field in module.SHOWN:
+        np.testing.assert_allclose(found[field], same[field], rtol=1e-6, atol=2e-6, err_msg=field)
 
 
 @a_sixth

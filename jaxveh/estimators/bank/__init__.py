@@ -14,8 +14,8 @@ import numpy as np
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.bank.observers import disturbance_observer, unknown_input_observer
 from jaxveh.estimators.bank.tseng import tseng_of
-from jaxveh.estimators.leaning import leaning_filter
 from jaxveh.estimators.following import follow
+from jaxveh.estimators.leaning import leaning_filter
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
 from jaxveh.io import CarSpecification
 

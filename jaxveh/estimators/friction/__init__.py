@@ -14,6 +14,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
+from jaxveh.estimators.following import follow
 from jaxveh.estimators.friction.along import AlongEvidence, WheelForces
 from jaxveh.estimators.friction.augmented import augmented_filter
 from jaxveh.estimators.friction.axles import AligningTorque, Axles, HybridObserver, LateralCurve
@@ -24,7 +25,6 @@ from jaxveh.estimators.friction.scalar import Follower
 from jaxveh.estimators.friction.slipping_wheels import SidesApart, WheelObserver
 from jaxveh.estimators.friction.stiffness_doubt import with_doubt
 from jaxveh.estimators.friction.wheels import Reconstruction, SlipSlope, WheelSlips
-from jaxveh.estimators.following import follow
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
 from jaxveh.io import CarSpecification
 from jaxveh.tyres import LuGre

@@ -71,7 +71,7 @@ class Axles(eqx.Module):
 
     def slip_difference(self, now: AxlesTold):
         """The front slip angle less the rear slip angle, rad."""
-        return now.steer - self.car.wheelbase * now.yaw_rate / now.told.v_x
+        return now.steer - self.car.steer_offset - self.car.wheelbase * now.yaw_rate / now.told.v_x
 
     def residual(self, forces, difference, log_friction, stiffer):
         """The measured front force (N) less that of the brush curve at the front slip angle; the rear slip angle follows from the

@@ -16,21 +16,25 @@ from jaxveh.estimators.friction.motion import LATERAL, Told, next_told, start_to
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.vehicles import GRAVITY
 
-STATES = 7
-"""Number of states: v_y (m/s), yaw rate (rad/s), relative stiffness errors in front and at the rear, offsets of a_y (m/s^2) and
-steer (rad), and the relative increase of the measured a_y because the body leans."""
-
+STATES = 8
+"""Number of states: v_y (m/s), yaw rate (rad/s), relative stiffness errors in front and at the rear, the offset of a_y (m/s^2),
+the error of the steer that comes and goes (rad), the relative increase of the measured a_y because the body leans, and the offset
+of the steer that stays (rad)."""
 
 STEER_TIME = 3.0
 """s: time constant of an error of the measured steer, most of which is the play of the steering."""
 
+
+SLOPES, LASTING = 1.0, 0.1
+"""m/s^2: by how much a measured acceleration may exceed what the tyres carry, by slopes and offsets; and s: accelerations closer
+than this count as one."""
 
 NEAR = 0.18232
 """ln 1.2: a friction is known if it is probably within this range around the median."""
 
 
 class Bank(NamedTuple):
-    """Logarithms of the weights (K,), each filter's mean (K, 7) and covariance (K, 7, 7)."""
+    """Logarithms of the weights (K,), each filter's mean (K, 8) and covariance (K, 8, 8)."""
 
     weights: Any
     means: Any
@@ -55,7 +59,7 @@ class FrictionBank(AbstractMethod):
     to any value. So old evidence is forgotten, a jump is followed as fast as the forces show it, and the standard deviation
     reflects missing excitation: forces in the linear range only show that there is more friction than they use. If the log has
     torques and wheel speeds and the car's file has the wheels' radius and inertia, longitudinal slips also weight the frictions
-    (`AlongEvidence`).
+    (`AlongEvidence`). A friction that could not have carried the measured acceleration is not possible.
 
     The answer is the median and the standard deviation about it. `known`: the probability that the friction is within 20 % of the
     median is at least `certainty`. The estimate is the road's friction over that on which the car's tyre parameters hold, one
@@ -64,7 +68,8 @@ class FrictionBank(AbstractMethod):
     `frictions` (K,) of the filters and `prior` (K,), their probabilities without information; `jumps` (1/s): rate of jumps to any
     friction; `walk` (1/sqrt(s)): random walk of ln mu; `turn_time`, `force_time` (s): innovations of yaw rate and of a_y closer
     than this count as one; `stiffness_spread` (-) of an axle's slope, which changes within `stiffness_time` (s) and so absorbs
-    errors of the curve; `steer_noise` (rad), play included; `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5): model errors;
+    errors of the curve; `steer_noise` (rad), play included, and `steer_offset` (rad), the standard deviation of one that stays;
+    `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5): model errors;
     `a_y_noise` (m/s^2) and `force_noise` (-), a share of the measured a_y; `yaw_rate_noise` (rad/s).
 
     The weights are no exact likelihoods: all frictions share one innovation variance, because separate ones would favour low
@@ -84,6 +89,7 @@ class FrictionBank(AbstractMethod):
     stiffness_spread: jax.Array = positive("-", default=0.15)
     stiffness_time: jax.Array = positive("s", default=3.0)
     steer_noise: jax.Array = positive("rad", default=0.0007)
+    steer_offset: jax.Array = positive("rad", default=0.004)
     v_y_noise: jax.Array = positive("m/s^1.5", default=0.15)
     yaw_noise: jax.Array = positive("rad/s^1.5", default=0.03)
     a_y_noise: jax.Array = positive("m/s^2", default=0.1)
@@ -106,7 +112,7 @@ class FrictionBank(AbstractMethod):
         bank = self._mix(memory.bank, dt)
         moved = self._move(bank, told, dt)
         moved, likelihoods = self._correct(moved, told, values, dt)
-        weights = bank.weights + likelihoods
+        weights = bank.weights + likelihoods + self._carried(told, values["a_y"], dt)
         along = None
         if self.along is not None:
             along, more = self.along.next(memory.along, t, values, told, self.frictions, jnp.exp(bank.weights))
@@ -128,6 +134,7 @@ class FrictionBank(AbstractMethod):
         spread = jnp.stack([
             0.5 + 0.0 * self.stiffness_spread, 0.1 + 0.0 * self.stiffness_spread, self.stiffness_spread,
             self.stiffness_spread, 0.15 + 0.0 * self.stiffness_spread, self.steer_noise, GRAVITY * self.car.roll_gradient,
+            self.steer_offset,
         ])  # fmt: skip
         lean = GRAVITY * self.car.roll_gradient + zero
         return jnp.zeros((len(zero), STATES), zero.dtype).at[:, 6].set(lean), jnp.repeat(
@@ -157,9 +164,9 @@ class FrictionBank(AbstractMethod):
 
     def _forces(self, x, friction, told: Told):
         """Lateral forces of both axles (N) in the body's axes; longitudinal forces reduce the available friction."""
-        v_y, yaw_rate, soft_front, soft_rear, _, offset, _ = x
+        v_y, yaw_rate, soft_front, soft_rear, _, error, _, offset = x
         car = self.car
-        slips = car.slip_angles(told.steer - offset, told.v_x, v_y, yaw_rate)
+        slips = car.slip_angles(told.steer - error - offset, told.v_x, v_y, yaw_rate)
         loads = car.load_ratios(told.a_x)
         share = jnp.where(told.a_x < 0.0, car.front_brake, car.front_drive)
         forces = []
@@ -188,12 +195,12 @@ class FrictionBank(AbstractMethod):
         soft = self.stiffness_spread * jnp.sqrt(2.0 / self.stiffness_time)
         walks = jnp.stack([
             self.v_y_noise, self.yaw_noise, soft, soft, 0.005 + 0.0 * dt,
-            self.steer_noise * jnp.sqrt(2.0 / STEER_TIME), 0.001 + 0.0 * dt,
+            self.steer_noise * jnp.sqrt(2.0 / STEER_TIME), 0.001 + 0.0 * dt, 1e-5 + 0.0 * dt,
         ])  # fmt: skip
         noise = jnp.diag(jnp.square(walks) * dt)
         same = jnp.ones_like(dt)
         dies = jnp.exp(-dt / self.stiffness_time)
-        fades = jnp.stack([same, same, dies, dies, same, jnp.exp(-dt / STEER_TIME), same])
+        fades = jnp.stack([same, same, dies, dies, same, jnp.exp(-dt / STEER_TIME), same, same])
 
         def one(x, P, friction):
             rates = lambda x: self._rates(x, friction, told)
@@ -232,6 +239,13 @@ class FrictionBank(AbstractMethod):
             common = jnp.sum(jnp.exp(bank.weights) * variance)
             likelihoods = likelihoods - 0.5 * (1.0 - jnp.exp(-dt / time)) * jnp.square(error) / common
         return Bank(bank.weights, means, covariances), likelihoods
+
+    def _carried(self, told: Told, a_y, dt):
+        """Logarithms (K,) of how likely each friction carries the accelerations of this row."""
+        most = self.frictions * (self.car.front.peak + self.car.rear.peak) / self.car.mass
+        a_y = jnp.where(jnp.isnan(a_y), 0.0, a_y) / (1.0 + GRAVITY * self.car.roll_gradient)
+        excess = jnp.maximum(numerics.hypot(told.a_x, a_y) - SLOPES - most, 0.0)
+        return -0.5 * jnp.minimum(dt / LASTING, 1.0) * jnp.square(excess / (3.0 * self.a_y_noise))
 
     def _answer(self, bank: Bank, told: Told):
         weights = jnp.exp(bank.weights)

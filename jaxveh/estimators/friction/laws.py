@@ -70,6 +70,7 @@ class PlanarCar(eqx.Module):
     front_drive: jax.Array = parameter("-", scale=0.5)
     front_brake: jax.Array = parameter("-", scale=0.5)
     roll_gradient: jax.Array = parameter("rad s^2/m", scale=0.005)
+    steer_offset: jax.Array = parameter("rad", scale=0.003, default=0.0)
 
     @property
     def wheelbase(self):
@@ -95,8 +96,8 @@ class PlanarCar(eqx.Module):
         return front, (self.front_axle_to_cg * lateral - turn) / self.wheelbase
 
     def slip_angles(self, steer, v_x, v_y, yaw_rate):
-        """Slip angles of both axles, rad; `v_x` (m/s) well above zero."""
-        front = steer - numerics.arctan((v_y + self.front_axle_to_cg * yaw_rate) / v_x)
+        """Slip angles of both axles, rad, with the measured `steer`; `v_x` (m/s) well above zero."""
+        front = steer - self.steer_offset - numerics.arctan((v_y + self.front_axle_to_cg * yaw_rate) / v_x)
         return front, -numerics.arctan((v_y - self.rear_axle_to_cg * yaw_rate) / v_x)
 
 
@@ -114,7 +115,7 @@ def planar_car(car: CarSpecification) -> PlanarCar:
         mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=car.front_axle_to_cg,
         rear_axle_to_cg=car.rear_axle_to_cg, cg_height=told(car.cg_height, 0.55), half_track=0.5 * sum(tracks) / len(tracks),
         front=curves[0], rear=curves[1], front_drive=told(car.front_drive, 0.5), front_brake=told(car.front_brake, 0.65),
-        roll_gradient=ROLL_GRADIENT,
+        roll_gradient=ROLL_GRADIENT, steer_offset=told(car.steer_offset, 0.0),
     )  # fmt: skip
 
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.recording import Recording
+from jaxveh.estimators.following import follow
 from jaxveh.estimators.geometry.learned import Learned, numbers_learned, read_learned, start_from, write_learned
 from jaxveh.estimators.geometry.learner import UNITS, learner_of
-from jaxveh.estimators.following import follow
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
 from jaxveh.io import CarSpecification
 

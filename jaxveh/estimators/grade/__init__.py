@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.grade.kinematic import Climb, kinematic_of, satellite_of
 from jaxveh.estimators.following import follow
+from jaxveh.estimators.grade.kinematic import Climb, kinematic_of, satellite_of
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
 from jaxveh.estimators.pulling import joint_filter, pulling_filter
 from jaxveh.io import CarSpecification

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.recording import Recording
+from jaxveh.estimators.following import follow
 from jaxveh.estimators.mass.forgetting import forgetting_factors
 from jaxveh.estimators.mass.ratios import gated_ratios, high_pass_of, kinematic_of
-from jaxveh.estimators.following import follow
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
 from jaxveh.estimators.pulling import joint_filter, pulling_filter
 from jaxveh.io import CarSpecification

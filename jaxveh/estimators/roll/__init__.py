@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.leaning import leaning_filter
 from jaxveh.estimators.following import follow
+from jaxveh.estimators.leaning import leaning_filter
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
 from jaxveh.estimators.roll.gyro import gyro_of
 from jaxveh.estimators.roll.six_axis import six_axis_of

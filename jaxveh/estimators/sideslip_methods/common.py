@@ -12,8 +12,9 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractMethod, Answer, answer
 from jaxveh.estimators.rear_axle import USUAL_WHEELBASE
 from jaxveh.io import CarSpecification
@@ -40,6 +41,27 @@ diverged."""
 
 LONG_AGO = 1e3
 """s: the age of a channel that was never measured."""
+
+
+class StraightSteer(AbstractCleaning):
+    """Takes the `offset` (rad) of the channel `steer` out, for cars that have none of their own."""
+
+    offset: jax.Array = parameter("rad", scale=0.02)
+
+    @property
+    def channels(self):
+        return ("steer",)
+
+    def first(self, t, values):
+        return None, values | {"steer": values["steer"] - self.offset}
+
+    def next(self, memory, t, values):
+        return self.first(t, values)
+
+
+def straight_steer(car: CarSpecification) -> StraightSteer:
+    """`StraightSteer` with the offset of a car's file."""
+    return StraightSteer(car.steer_offset or 0.0)
 
 
 class Watched(NamedTuple):

@@ -18,6 +18,7 @@ from jaxveh.estimators.sideslip_methods.common import (
     guard,
     keys_of,
     slowest_of,
+    straight_steer,
 )
 from jaxveh.estimators.sideslip_methods.kinematic import AtSpeed
 from jaxveh.estimators.sideslip_methods.single_track import (
@@ -103,7 +104,8 @@ def two_track(car: CarSpecification) -> Guarded:
     review's [19]), with lateral load transfer."""
     numbers = car_numbers(car, "the two-track car", leaning=False)
     vehicle = build(numbers, TwoTrack2DOF, load_transfer=QuasiStatic(), **wheel_options(car))
-    return in_filter(car, lateral_model(vehicle, slowest_of(car)), filters.Unscented())
+    model = lateral_model(vehicle, slowest_of(car))
+    return in_filter(car, model, filters.Unscented(), cleaning=straight_steer(car))
 
 
 def leaning_observation(system: Lateral, t, x, u):
@@ -141,7 +143,8 @@ def roll_3dof(car: CarSpecification) -> Guarded:
     measured roll rate is used if available."""
     numbers = car_numbers(car, "the leaning car", leaning=True)
     vehicle = build(numbers, Roll3DOF, load_transfer=QuasiStatic(), **wheel_options(car))
-    return in_filter(car, _leaning_model(vehicle, car), filters.Unscented(), more=(ROLL_RATE._replace(optional=True),))
+    more = (ROLL_RATE._replace(optional=True),)
+    return in_filter(car, _leaning_model(vehicle, car), filters.Unscented(), more=more, cleaning=straight_steer(car))
 
 
 def driven_transition(system: Lateral, t0, t1, x, u):
@@ -160,5 +163,5 @@ def roll_4dof(car: CarSpecification) -> Guarded:
     vehicle = build(numbers, Roll4DOF, load_transfer=QuasiStatic(), **wheel_options(car))
     model = _leaning_model(vehicle, car, driven=True)
     needs = (V_X, STEER, *SENSORS, ROLL_RATE._replace(optional=True), *PEDALS)
-    inner = AtSpeed(model, filters.Unscented(), needs, shown=LateralReport._fields)
+    inner = AtSpeed(model, filters.Unscented(), needs, straight_steer(car), shown=LateralReport._fields)
     return guard(car, inner, SENSORS, claims=False)

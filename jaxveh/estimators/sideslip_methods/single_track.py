@@ -16,6 +16,7 @@ from jaxveh._core.errors import check_one_of
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import UNNAMED, positive
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.live import AbstractCleaning, AsItIs
 from jaxveh.estimators.method import AbstractMethod, Filtered
 from jaxveh.estimators.sideslip_methods.common import (
     A_Y,
@@ -27,6 +28,7 @@ from jaxveh.estimators.sideslip_methods.common import (
     guard,
     sideslip_answer,
     slowest_of,
+    straight_steer,
 )
 from jaxveh.estimators.sideslip_methods.stiff_step import StiffStep
 from jaxveh.io import CarSpecification
@@ -214,10 +216,10 @@ def axles_of(car: Any) -> tuple[Axle, Axle]:
 
 def in_filter(
     car: CarSpecification, model: StateSpace, filter: AbstractFilter, *, more: tuple[Need, ...] = (), key: Any = None,
-    claims: bool = False,
+    claims: bool = False, cleaning: AbstractCleaning = AsItIs(),
 ) -> Guarded:  # fmt: skip
     """A filter or an observer as a method, on a model whose inputs are steer, speed and the channels in `more`."""
-    inner = Filtered(model, filter, (V_X, STEER, *SENSORS, *more), shown=LateralReport._fields, key=key)
+    inner = Filtered(model, filter, (V_X, STEER, *SENSORS, *more), cleaning, shown=LateralReport._fields, key=key)
     return guard(car, inner, SENSORS, claims=claims)
 
 
@@ -244,7 +246,7 @@ def linear_kalman(car: CarSpecification) -> Guarded:
     known = {name: getattr(plain, name) for name in ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg")}
     stiffness = dict(front_stiffness=plain.front.cornering_stiffness, rear_stiffness=plain.rear.cornering_stiffness)
     model = lateral_model(LinearSingleTrack(**known, **stiffness), slowest_of(car))
-    return in_filter(car, model, filters.Kalman())
+    return in_filter(car, model, filters.Kalman(), cleaning=straight_steer(car))
 
 
 class OpenLoop(AbstractMethod):
