@@ -134,8 +134,7 @@ def untold_in_words(calibration: Calibration) -> str | None:
     names = [estimators.kit.in_words(name) for name in sideslip.little_told(calibration)]
     if not names:
         return None
-    they = "it stays near its prior" if len(names) == 1 else "they stay near their priors"
-    return f"The logs contain little information about {', '.join(names)}: {they}; the bands allow for it."
+    return f"The logs contain little information about {', '.join(names)}; the bands allow for it."
 
 
 def fitted_car(calibration: Calibration, car: CarSpecification, parts: Sequence[Recording]) -> CarSpecification:

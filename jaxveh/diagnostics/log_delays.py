@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.log_findings import LogFinding, LogView
-from jaxveh.diagnostics.log_single_track import a_y_from_yaw_rate, yaw_rate_from_steer
+from jaxveh.diagnostics.log_single_track import a_y_from_yaw_rate, steady_v_y, yaw_rate_from_steer
 from jaxveh.io import CarSpecification
 
 REACH = 0.5
@@ -31,6 +31,10 @@ SMOOTH = 0.2
 
 MODELLED = 0.06
 """Largest delay without a warning between two channels that are related by a linear model of the car, s."""
+
+
+DOUBTFUL = 0.15
+"""Delay up to which one that a linear model of the car shows may be due to the car's file, s."""
 
 
 class Delay(NamedTuple):
@@ -77,13 +81,23 @@ def check_delays(log: LogView) -> list[LogFinding]:
     if log.has("v_x", "yaw_rate", "a_y"):
         findings.append(_lateral(log))
     if log.has("v_x", "a_x"):
-        change = log.slope(log.even("v_x"))
-        if log.has("v_y", "yaw_rate"):
-            change = change - log.even("v_y") * log.even("yaw_rate")
-        findings.append(_judge(log, "a_x", "dv_x/dt", change, "", EXACT))
+        findings.append(_longitudinal(log))
     if log.has("steer", "yaw_rate", "v_x"):
         findings.append(_steering(log))
     return findings
+
+
+def _longitudinal(log: LogView) -> LogFinding:
+    """Compare a_x with the rate of speed; in bends it also contains v_y yaw_rate, which without v_y is that of a steady turn."""
+    speed, change = log.even("v_x"), log.slope(log.even("v_x"))
+    if not log.has("yaw_rate"):
+        return _judge(log, "a_x", "dv_x/dt", change, "", MODELLED)
+    if log.has("v_y"):
+        return _judge(log, "a_x", "dv_x/dt", change - log.even("v_y") * log.even("yaw_rate"), "", EXACT)
+    if log.car is not None:
+        yaw_rate = log.even("yaw_rate")
+        change = change - steady_v_y(log.car, yaw_rate, speed) * yaw_rate
+    return _judge(log, "a_x", "dv_x/dt", change, "", MODELLED)
 
 
 def _lateral(log: LogView) -> LogFinding:
@@ -142,7 +156,10 @@ def _judge(log: LogView, name: str, other: str, reference: np.ndarray, caveat: s
         return LogFinding("ok", name, words, values)
     if np.isinf(tolerance):
         return LogFinding("note", name, words, values)
-    return LogFinding("warning", name, f"{words} Shift the channel by this delay before estimating.", values)
+    advice = "Shift the channel by this delay before estimating."
+    if tolerance == MODELLED and size < DOUBTFUL:
+        advice = "Wrong stiffnesses in the car's file look alike: shift the channel only if you know that it is late."
+    return LogFinding("warning", name, f"{words} {advice}", values)
 
 
 def _correlations(reference: np.ndarray, signal: np.ndarray, most: int) -> np.ndarray:

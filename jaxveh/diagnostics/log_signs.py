@@ -65,6 +65,9 @@ def check_wheel_speeds(log: LogView) -> list[LogFinding]:
 
 _SAME = (0.8, 1.25)
 
+GENTLE = 3.0
+"""Lateral acceleration up to which no car slides, on any road but ice, m/s^2."""
+
 
 def _wheels_over_speed(log: LogView) -> float | None:
     """Return the median of all wheel speeds over v_x in moving rows; None if there are too few rows."""
@@ -84,7 +87,7 @@ def check_signs(log: LogView) -> list[LogFinding]:
     steering = _correlation(log) if log.has("steer", "yaw_rate", "v_x") else None
     lateral = _lateral(log) if log.has("v_x", "yaw_rate", "a_y") else None
     if steering is not None:
-        findings.append(_steering(steering, lateral))
+        findings.append(_steering(steering, _correlation(log, GENTLE), lateral))
     if lateral is not None:
         findings.append(_slope("a_y", "v_x yaw_rate", lateral, _LATERAL, "yaw_rate or a_y"))
     if log.has("v_x", "v_y", "yaw_rate", "a_y"):
@@ -99,8 +102,14 @@ def check_signs(log: LogView) -> list[LogFinding]:
     return findings
 
 
-def _correlation(log: LogView) -> float:
+def _correlation(log: LogView, most: float = np.inf) -> float:
+    """The correlation of yaw rate and steer where |v_x yaw_rate| has been at most `most` (m/s^2) for half a second, and stays."""
     steer, yaw_rate = log.smooth(log.even("steer"), 0.2), log.smooth(log.even("yaw_rate"), 0.2)
+    with np.errstate(invalid="ignore"):
+        hard = np.abs(log.even("v_x") * yaw_rate) > most
+    around = 2 * round(0.5 / log.step) + 1
+    if hard.size >= around:
+        yaw_rate = np.where(np.convolve(hard, np.ones(around), "same") > 0.5, np.nan, yaw_rate)
     coefficients, _, correlation = fit(log.while_moving(yaw_rate), steer)
     return correlation * float(np.sign(coefficients[1]))
 
@@ -139,13 +148,18 @@ def _longitudinal(log: LogView) -> tuple[float, float, float]:
     return float(coefficients[1]), float(coefficients[0]), correlation
 
 
-def _steering(correlation: float, lateral: tuple[float, float, float] | None) -> LogFinding:
+def _steering(correlation: float, gently: float, lateral: tuple[float, float, float] | None) -> LogFinding:
     values = {"correlation": correlation}
     if correlation > AGREE:
         return LogFinding("ok", "steer", f"agrees in sign with yaw_rate (correlation {correlation:.2f}).", values)
     if correlation > -AGREE:
         message = (
             f"has little to do with yaw_rate (correlation {correlation:.2f}): too little steering, or wrong columns?"
+        )
+        return LogFinding("note", "steer", message, values)
+    if gently > 0.0:
+        message = (
+            f"steers against yaw_rate (correlation {correlation:.2f}), but not in gentle turns: a car that slides."
         )
         return LogFinding("note", "steer", message, values)
     agrees = lateral is not None and lateral[2] > AGREE and lateral[0] > 0

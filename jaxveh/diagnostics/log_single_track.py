@@ -52,6 +52,12 @@ def a_y_from_yaw_rate(car: CarSpecification, yaw_rate: np.ndarray, v_x: np.ndarr
     return a_y
 
 
+def steady_v_y(car: CarSpecification, yaw_rate: np.ndarray, v_x: np.ndarray) -> np.ndarray:
+    """Return v_y (N,) in m/s in a steady turn of the linear single track with this yaw rate (N,) in rad/s."""
+    softness = car.mass * car.front_axle_to_cg / (car.wheelbase * float(car.rear_cornering_stiffness or np.inf))
+    return (car.rear_axle_to_cg - softness * v_x * np.abs(v_x)) * yaw_rate
+
+
 def understeer_gradient(car: CarSpecification) -> float:
     """Return the steer at the road wheels beyond the geometric part per lateral acceleration, rad per m/s^2."""
     a, b, C_f, C_r = (

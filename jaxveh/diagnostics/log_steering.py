@@ -13,8 +13,14 @@ GENTLE = 3.0
 USUAL_WHEELBASE = 2.7
 """Assumed wheelbase of an unknown car, m."""
 
+UNDERSTEERS = (0.0, 0.003)
+"""Understeer gradients of cars that are neutral or usual, rad per m/s^2: the file's may be wrong."""
+
 OFFSET = np.deg2rad(0.2)
 """Steering offset above which there is a warning, rad."""
+
+FOLLOWS = 0.5
+"""Correlation from which steer follows what a car needs."""
 
 STANDSTILL = 0.1
 """Speed below which a car counts as standing, m/s."""
@@ -44,14 +50,17 @@ def check_steering(log: LogView) -> list[LogFinding]:
 
 def _scale(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) -> LogFinding:
     car = log.car
-    wheelbase, understeer = (USUAL_WHEELBASE, 0.0) if car is None else (car.wheelbase, understeer_gradient(car))
-    coefficients, _, correlation = fit(steer, wheelbase * bend + understeer * push)
+    wheelbase, own = (USUAL_WHEELBASE, ()) if car is None else (car.wheelbase, (understeer_gradient(car),))
+    # A wrong unit is wrong with each of them; a file with wrong stiffnesses is not taken for one.
+    fits = [fit(steer, wheelbase * bend + understeer * push) for understeer in (*own, *UNDERSTEERS)]
+    followed = [one for one in fits if one[2] >= FOLLOWS and one[0][1] > 0] or fits[:1]
+    coefficients, _, correlation = min(followed, key=lambda one: abs(np.log(max(one[0][1], 1e-9))))
     scale = float(coefficients[1])
     values = {"scale": scale, "correlation": correlation}
     # The range is wide because stiffnesses may be wrong by a factor of two; wrong units and steering ratios give larger errors.
     low, high = (0.35, 4.0) if car is None else (0.4, 2.5)
     against = f"a car with an assumed wheelbase of {USUAL_WHEELBASE:g} m" if car is None else "the car"
-    if correlation < 0.5 or scale <= 0:
+    if correlation < FOLLOWS or scale <= 0:
         message = f"does not follow the steer that yaw_rate and speed need (correlation {correlation:.2f})."
         return LogFinding("note", "steer", message, values)
     if low <= scale <= high:

@@ -214,7 +214,8 @@ def _validate(filter, model, logs: Sequence[Recording], counted: Sequence[np.nda
 
 def little_told(source: Calibration) -> tuple[str, ...]:
     """Names of the parameters that the calibration's logs hardly determine: their standard deviation is still `LITTLE` of the
-    prior's, or more. They are near the values of the car's file or the usual ones, and the bands allow for it."""
+    prior's, or more; the bands allow for it. A value may still be far from the prior's: the fit uses it to explain what the model
+    lacks."""
     chosen = source.fit.chosen
     prior = np.stack([np.asarray(one) for one in prior_spread(chosen, pick(source.model, chosen), SPREADS)])
     left = np.sqrt(np.diag(np.asarray(source.fit.covariance)))

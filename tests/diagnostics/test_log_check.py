@@ -231,7 +231,10 @@ def test_without_a_car_and_without_v_y(sound):
     assert matching(known, "ok", "a_y", "the prediction of the car's linear model from yaw_rate")
     late_a_y = {**few, "a_y": late(0.1)(few["a_y"])}
     assert matching(
-        findings(time, late_a_y), "warning", "a_y", r"comes (9.|10.) ms \(.*\) after the prediction of the car"
+        findings(time, late_a_y),
+        "warning",
+        "a_y",
+        r"comes (9.|10.) ms \(.*\) after the prediction of the car.* only if you know",
     )
     in_degrees = {**few, "steer": np.rad2deg(few["steer"])}
     found = findings(time, in_degrees, None)
@@ -261,6 +264,55 @@ def test_understeer_of_another_car(sound):
     assert matching(findings(*sound, other), "warning", "steer", r"understeer gradient .* Check stiffnesses")
     (right,) = matching(findings(*sound), "ok", "steer", "understeer gradient")
     assert right.values["measured"] == pytest.approx(right.values["expected"], abs=2e-4)
+
+
+@pytest.mark.parametrize(("front", "rear"), [(1.3, 0.7), (0.7, 1.3), (1.6, 0.6)])
+def test_a_file_with_wrong_stiffnesses_is_not_taken_for_a_wrong_scale_of_the_steer(sound, front, rear):
+    """With the first and the last the file's car oversteers, so that at speed it needs no steer, or one to the other side."""
+    other = dataclasses.replace(
+        CAR,
+        front_cornering_stiffness=front * CAR.front_cornering_stiffness,
+        rear_cornering_stiffness=rear * CAR.rear_cornering_stiffness,
+    )
+    found = findings(*sound, other)
+    assert not [one for one in found if one.severity == "error"], found
+    # A scale that is wrong still is.
+    assert matching(findings(*plant(sound, steer=np.rad2deg), other), "error", "steer", "looks like degrees")
+
+
+def test_a_car_that_countersteers_has_no_steer_of_the_wrong_sign(sound):
+    """Half of the time it slides, and is steered against its turn."""
+    time, channels = sound
+    hard = 12.0 * np.sin(0.9 * time) / channels["v_x"]
+    slides = (time > 15.0) & (np.abs(hard * channels["v_x"]) > 3.2)
+    slid = {
+        **channels,
+        "yaw_rate": np.where(slides, hard, channels["yaw_rate"]),
+        "steer": np.where(slides, -hard, channels["steer"]),
+    }
+    found = findings(time, slid)
+    assert matching(found, "note", "steer", "but not in gentle turns: a car that slides")
+    assert not matching(found, "error", "steer", "wrong sign")
+
+
+def test_a_car_that_drives_in_bends_has_no_late_a_x_for_want_of_v_y():
+    """Slow, tight bends: a_x contains v_y yaw_rate."""
+    time, channels = drive(swing=1.0)
+    v_x, bend = 5.0 + 0.3 * np.sin(0.25 * time), 0.12 * np.sin(0.4 * time)
+    yaw_rate = v_x * bend
+    v_y = CAR.rear_axle_to_cg * yaw_rate
+    a_x = np.gradient(v_x, time) - v_y * yaw_rate
+    log = {
+        "v_x": v_x,
+        "yaw_rate": yaw_rate,
+        "a_x": a_x,
+        "a_y": np.gradient(v_y, time) + v_x * yaw_rate,
+        "steer": 2.7 * bend,
+    }
+    (found,) = [
+        one for one in findings(time, log) if one.channel == "a_x" and "dv_x/dt" in one.message and "ms" in one.message
+    ]
+    assert found.severity == "ok" and abs(found.values["seconds"]) < 0.01
 
 
 def test_only_gentle_turns_tell_of_understeer(sound):

@@ -72,6 +72,22 @@ def test_the_recommended_one_lives_with_noise_offsets_and_another_lean_and_its_s
     assert np.mean(squares) < 3.0
 
 
+def test_without_a_course_no_stiffness_is_known_and_the_spread_says_so():
+    """The noises of steer and acceleration look like soft tyres."""
+    channels = drive(noise=1.0)
+    guided, blind = (
+        estimated("walking", channels),
+        estimated("walking", channels | {"course": np.full(T.shape, np.nan)}),
+    )
+    for field in SHOWN:
+        share = np.asarray(getattr(blind.std, field)) / np.asarray(blind[field])
+        assert not np.asarray(getattr(blind.known, field)).any() and share.min() > 0.2
+        assert getattr(guided.known, field)[-1] and getattr(guided.std, field)[-1] < 0.07 * guided[field][-1]
+    # A receiver that falls silent takes nothing away at once.
+    silent = estimated("walking", channels | {"course": np.where(T < 50.0, channels["course"], np.nan)})
+    assert all(np.asarray(getattr(silent.known, field))[-1] for field in SHOWN)
+
+
 def test_straight_ahead_nothing_is_known():
     straight = {name: np.zeros_like(values) for name, values in drive().items()} | {"v_x": np.full(T.shape, SPEED)}
     for name in stiffness.METHODS:

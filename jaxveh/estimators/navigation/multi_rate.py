@@ -204,7 +204,9 @@ def multi_rate_of(car: CarSpecification) -> MultiRate:
         report=report,
         process_noise=Continuous(Gaussian(PROCESS_NOISE)),
         measurement_noise=Gaussian({"yaw_rate": 0.003, "course": 0.004}),
-        prior=Prior(Track(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)._replace(steer_offset=car.steer_offset or 0.0), Gaussian(SPREAD)),
+        prior=Prior(
+            Track(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)._replace(steer_offset=car.steer_offset or 0.0), Gaussian(SPREAD)
+        ),
         inputs=("steer", "v_x"),
         angles=("course",),
     )

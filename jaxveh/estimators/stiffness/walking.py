@@ -22,12 +22,24 @@ sensors and steer (s)."""
 SATELLITE = (Need("course", "rad", optional=True),)
 
 
+LONGEST_WAIT = 1.0
+"""s: the longest time between two fixes of a satellite receiver that counts as available."""
+
+BLIND, GUIDED, FORGOTTEN = 0.25, 20.0, 300.0
+"""Without a course, noises of steer and a_y and the bend of tyres' curves are taken for soft tyres: by 0.15 to 0.45 on simulated
+cars, whatever the filter's own standard deviation. This standard deviation of ln C is added, and fades within `GUIDED` s of
+driving with a course; in as much as `FORGOTTEN` s without one it returns."""
+
+
 class WalkMemory(NamedTuple):
-    """The signals; the belief of the states; the low-passed rate of the course, a_y / v (rad/s)."""
+    """The signals; the belief of the states; the low-passed rate of the course, a_y / v (rad/s); the time since the last course,
+    and for how long the car has lately driven with one, `guided` (s)."""
 
     signals: Signals
     belief: Belief
     turning: Any
+    course_age: Any
+    guided: Any
 
 
 class WalkingStiffness(AbstractSmoothable):
@@ -40,6 +52,8 @@ class WalkingStiffness(AbstractSmoothable):
     which increases the measured acceleration. Where tyres leave their linear range (`linear`, m/s^2 of lateral acceleration),
     measurements count less and less. Also on a slippery road the estimate is the slope at zero slip, as long as the lateral
     acceleration is small.
+
+    Without a course a stiffness is not known (`BLIND`).
 
     `spread` (-): standard deviation of ln C before the drive, `walk` (1/sqrt(s)): its random walk; `v_y_noise` (m/s^1.5),
     `yaw_noise` (rad/s^1.5); `a_y_noise` (m/s^2), `yaw_rate_noise` (rad/s), `course_noise` (m/s, lateral); `steer_noise`
@@ -68,7 +82,8 @@ class WalkingStiffness(AbstractSmoothable):
     def first(self, t, values):
         signals = self.followed.start(t, values)
         mean = jnp.zeros((STATES,), self.spread.dtype).at[7].set(LEAN)
-        memory = WalkMemory(signals, Belief(mean, self._start()), jnp.zeros_like(t))
+        zero = jnp.zeros_like(t)
+        memory = WalkMemory(signals, Belief(mean, self._start()), zero, zero + 1e3, zero)
         return memory, self.say(memory)
 
     def next(self, memory, t, values):
@@ -88,7 +103,10 @@ class WalkingStiffness(AbstractSmoothable):
         ahead = seen(belief.mean)
         late = values["course"] + self.course_delay * turning
         belief = heard(belief, ahead + numerics.wrap_angle(late - ahead), seen, self.course_noise / v_x)
-        after = WalkMemory(now, jax.tree.map(lambda a, b: jnp.where(now.moves, a, b), belief, start), turning)
+        age = jnp.where(jnp.isnan(values["course"]), memory.course_age + dt, 0.0)
+        guided = jnp.where(age < LONGEST_WAIT, memory.guided + dt, memory.guided * jnp.exp(-dt / FORGOTTEN))
+        belief, guided = jax.tree.map(lambda a, b: jnp.where(now.moves, a, b), (belief, guided), (start, memory.guided))
+        after = WalkMemory(now, belief, turning, age, guided)
         return after, self.say(after)
 
     def ahead(self, memory, t, values):
@@ -145,8 +163,9 @@ class WalkingStiffness(AbstractSmoothable):
         return Belief(moved, step @ belief.covariance @ step.T + jnp.diag(jnp.square(walks) * dt))
 
     def say(self, memory):
-        now, (x, P), _ = memory
-        std = jnp.sqrt(jnp.diagonal(P))[2:4]
+        now, (x, P) = memory.signals, memory.belief
+        blind = BLIND * jnp.exp(-memory.guided / GUIDED)
+        std = jnp.sqrt(jnp.diagonal(P)[2:4] + jnp.square(blind))
         file = (self.car.front_cornering_stiffness, self.car.rear_cornering_stiffness)
         names = ("front_cornering_stiffness", "rear_cornering_stiffness")
         mean = {name: file[k] * jnp.exp(jnp.clip(x[2 + k], -1.6, 1.6)) for k, name in enumerate(names)}
