@@ -8,7 +8,12 @@ import numpy as np
 
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.log_findings import LogFinding, LogView
-from jaxveh.diagnostics.log_single_track import a_y_from_yaw_rate, steady_v_y, yaw_rate_from_steer
+from jaxveh.diagnostics.log_single_track import (
+    a_y_from_yaw_rate,
+    steady_v_y,
+    understeer_gradient,
+    yaw_rate_from_steer,
+)
 from jaxveh.io import CarSpecification
 
 REACH = 0.5
@@ -32,6 +37,9 @@ SMOOTH = 0.2
 MODELLED = 0.06
 """Largest delay without a warning between two channels that are related by a linear model of the car, s."""
 
+
+STIFFNESSES, SLOPES = "Wrong stiffnesses in the car's file", "Slopes and bends"
+"""What looks like a delay to a model of the car, and to the rate of speed without v_y."""
 
 DOUBTFUL = 0.15
 """Delay up to which one that a linear model of the car shows may be due to the car's file, s."""
@@ -91,13 +99,13 @@ def _longitudinal(log: LogView) -> LogFinding:
     """Compare a_x with the rate of speed; in bends it also contains v_y yaw_rate, which without v_y is that of a steady turn."""
     speed, change = log.even("v_x"), log.slope(log.even("v_x"))
     if not log.has("yaw_rate"):
-        return _judge(log, "a_x", "dv_x/dt", change, "", MODELLED)
+        return _judge(log, "a_x", "dv_x/dt", change, "", MODELLED, SLOPES)
     if log.has("v_y"):
         return _judge(log, "a_x", "dv_x/dt", change - log.even("v_y") * log.even("yaw_rate"), "", EXACT)
     if log.car is not None:
         yaw_rate = log.even("yaw_rate")
         change = change - steady_v_y(log.car, yaw_rate, speed) * yaw_rate
-    return _judge(log, "a_x", "dv_x/dt", change, "", MODELLED)
+    return _judge(log, "a_x", "dv_x/dt", change, "", MODELLED, SLOPES)
 
 
 def _lateral(log: LogView) -> LogFinding:
@@ -138,10 +146,15 @@ def _steering(log: LogView) -> LogFinding:
         caveat = " Without a car, this includes its own response of some 0.1 s."
         return _judge(log, "yaw_rate", "steer", log.while_moving(steer), caveat, np.inf)
     expected = yaw_rate_from_steer(log.car, steer, log.even("v_x"), log.step)
+    if understeer_gradient(log.car) < 0.0:
+        caveat = " The car's file oversteers: such a car answers late at speed."
+        return _judge(log, "yaw_rate", "the prediction of the car's linear model from steer", expected, caveat, np.inf)
     return _judge(log, "yaw_rate", "the prediction of the car's linear model from steer", expected, "", MODELLED)
 
 
-def _judge(log: LogView, name: str, other: str, reference: np.ndarray, caveat: str, tolerance: float) -> LogFinding:
+def _judge(
+    log: LogView, name: str, other: str, reference: np.ndarray, caveat: str, tolerance: float, alike: str = STIFFNESSES
+) -> LogFinding:
     # The same symmetric average on both sides removes noise and delays neither.
     found = delay(log.smooth(reference, SMOOTH), log.smooth(log.even(name), SMOOTH), log.step)
     values = {name: value for name, value in found._asdict().items() if np.isfinite(value)}
@@ -158,7 +171,7 @@ def _judge(log: LogView, name: str, other: str, reference: np.ndarray, caveat: s
         return LogFinding("note", name, words, values)
     advice = "Shift the channel by this delay before estimating."
     if tolerance == MODELLED and size < DOUBTFUL:
-        advice = "Wrong stiffnesses in the car's file look alike: shift the channel only if you know that it is late."
+        advice = f"{alike} look alike: shift the channel only if you know that it is late."
     return LogFinding("warning", name, f"{words} {advice}", values)
 
 

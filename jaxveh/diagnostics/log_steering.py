@@ -22,6 +22,9 @@ OFFSET = np.deg2rad(0.2)
 FOLLOWS = 0.5
 """Correlation from which steer follows what a car needs."""
 
+TIGHT = 0.06
+"""Angle of the wheelbase seen from a turn's centre from which a turn is tight, rad."""
+
 STANDSTILL = 0.1
 """Speed below which a car counts as standing, m/s."""
 
@@ -80,11 +83,19 @@ def _scale(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) 
 
 
 def _offset(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) -> list[LogFinding]:
-    """Fit steer = offset + L yaw_rate / v_x + K v_x yaw_rate; L is that of the car, or is fitted if the car is unknown."""
+    """Fit steer = offset + L yaw_rate / v_x + K v_x yaw_rate + T dsteer/dt with the car's L; without a car L is fitted instead
+    of T.
+
+    Tight turns are left out: there, two per cent of the ratio outweigh the understeer."""
+    bend = np.where(np.abs(bend) * (log.car.wheelbase if log.car else USUAL_WHEELBASE) < TIGHT, bend, np.nan)
+    if np.isfinite(bend * steer).sum() * log.step < 3.0:
+        message = "less than 3 s of driving in bends that are not tight: offset and understeer are not checked."
+        return [LogFinding("note", "steer", message, {})]
     if log.car is None:
-        coefficients, errors, _ = fit(steer, bend, push)
+        coefficients, errors, correlation = fit(steer, bend, push)
     else:
-        coefficients, errors, _ = fit(steer - log.car.wheelbase * bend, push)
+        # While the steer turns, the yaw rate is still behind it.
+        coefficients, errors, correlation = fit(steer - log.car.wheelbase * bend, push, log.slope(steer))
     offset, error = float(coefficients[0]), float(errors[0])
     told = (log.car.steer_offset if log.car else None) or 0.0
     rest = offset - told
@@ -99,7 +110,7 @@ def _offset(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray)
     if log.car is None:
         return findings
     measured, expected, spread = float(coefficients[1]), understeer_gradient(log.car), float(errors[1])
-    values = {"measured": measured, "expected": expected, "error": spread}
+    values = {"measured": measured, "expected": expected, "error": spread, "correlation": correlation}
     words = (
         f"understeer gradient of {_degrees_a_g(measured):+.2f} degrees per g (+-{_degrees_a_g(2 * spread):.2f}); the car's "
         f"stiffnesses give {_degrees_a_g(expected):+.2f}."
