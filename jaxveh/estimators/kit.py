@@ -5,17 +5,21 @@ from jaxveh.estimators.contract import Need, check_needs, cut_pieces, in_words, 
 from jaxveh.estimators.following import follow, follow_rows, smooth_rows
 from jaxveh.estimators.live import AbstractCleaning, AsItIs, clean_recording
 from jaxveh.estimators.method import AbstractSmoothable, answer, method_of
+from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
 
 __all__ = [
     "FULL_CAR",
     "AbstractCleaning",
     "AbstractSmoothable",
     "AsItIs",
+    "Belief",
     "Need",
     "answer",
+    "belief_of",
     "catalogue",
     "check_needs",
     "clean_recording",
+    "correct",
     "cut_pieces",
     "follow",
     "follow_rows",
@@ -23,7 +27,9 @@ __all__ = [
     "keys_asked",
     "method_of",
     "model_of",
+    "move",
     "smooth_rows",
     "spans_of",
+    "spread_of",
     "start_of",
 ]

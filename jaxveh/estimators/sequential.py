@@ -84,7 +84,8 @@ def update_by_each(belief: Belief, found: Innovation, trusts: Any) -> Belief:
 
 
 def belief_of(state_type: Any, means: Mapping[str, Any], stds: Mapping[str, Any], like: Any) -> Belief:
-    """Independent states with these means (0 where not given) and standard deviations, in the dtype of `like`."""
+    """Independent states of a NamedTuple `state_type` with these `means` and standard deviations `stds` by name (0 where not
+    given), in the dtype of `like`."""
     dtype = jnp.result_type(like)
     mean = _vector(means, state_type, dtype)
     return Belief(mean, jnp.diag(jnp.square(_vector(stds, state_type, dtype))))
@@ -120,7 +121,7 @@ def correct(
 
 
 def spread_of(belief: Belief, weights: Mapping[str, Any], state_type: Any) -> Any:
-    """The standard deviation of a weighted sum of states."""
+    """The standard deviation of a sum of states with `weights` by name, in a `belief`."""
     h = _vector(weights, state_type, belief.mean.dtype)
     return numerics.sqrt(jnp.maximum(h @ belief.covariance @ h, 0.0))
 
