@@ -28,14 +28,23 @@ def is_concrete(*values) -> bool:
     return not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(values))
 
 
+NOT_REAL = "USOcMm"
+"""The kinds of NumPy's types whose values are no real numbers: text, objects, complex numbers and dates."""
+
+
 def check(name: str, value, holds, allowed: str, advice: str = "") -> None:
     """Raise `InputError` naming `name`, `value` and the `allowed` range unless `holds(value)`; tracers pass.
 
-    `holds` is applied to the value as a NumPy array and must hold for every element.
+    `holds` is applied to the value as a NumPy array of real numbers and must hold for every element.
     """
     if value is None or not is_concrete(value):
         return
-    array = np.asarray(value)
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):
+        array = np.asarray(None)
+    if array.dtype.kind in NOT_REAL:
+        raise InputError(f"{name} = {value!r}: must be a real number, {allowed}." + (f" {advice}" if advice else ""))
     if not np.all(holds(array)):
         shown = array.item() if array.ndim == 0 else array
         raise InputError(f"{name} = {shown}: must be {allowed}." + (f" {advice}" if advice else ""))
@@ -54,6 +63,20 @@ def check_finite(name: str, value, advice: str = "") -> None:
 def check_at_least(name: str, value, least, advice: str = "") -> None:
     """Raise `InputError` unless every element of `value` is at least `least`."""
     check(name, value, lambda v: v >= least, f"at least {least}", advice)
+
+
+def named(value) -> str:
+    """Return a value of a wrong type as a message shows it: words and numbers as they are, others by their type."""
+    if value is None or isinstance(value, str | bool | int | float | complex):
+        return repr(value)
+    return f"the class {value.__name__}" if isinstance(value, type) else type(value).__name__
+
+
+def kind_of_inner(value) -> str:
+    """Return the type of what a wrapper has inside as a message shows it; of a class itself, that it is one."""
+    return (
+        f"the class {value.__name__}, not {value.__name__}(...)," if isinstance(value, type) else type(value).__name__
+    )
 
 
 def check_whole(name: str, value, least: int = 1, advice: str = "") -> None:
@@ -107,7 +130,8 @@ def check_key(who: str, key: Any) -> None:
 def float_array(value) -> Any:
     """Convert to a strong float array, of the default precision unless the value has its own float dtype.
 
-    A Python float or a weak type would cause a new compilation; see `equinox.field(converter=...)`.
+    A Python float or a weak type would cause a new compilation; see `equinox.field(converter=...)`. What is no real number is
+    returned as it is, for a check that knows its name.
     """
     if type(value) is float:
         # NumPy converts it in two thirds of the time, and a tyre has hundreds of them.
@@ -116,6 +140,11 @@ def float_array(value) -> Any:
     if isinstance(value, (jax.Array, np.ndarray, np.generic)) and np.issubdtype(value.dtype, np.floating):
         weak = getattr(value, "weak_type", False)
         return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float if weak else value.dtype))
-    if eqx.is_array_like(value):
+    if eqx.is_array_like(value) and not _is_no_number(value):
         return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float))
     return value
+
+
+def _is_no_number(value) -> bool:
+    dtype = getattr(value, "dtype", np.dtype(complex if isinstance(value, complex) else float))
+    return jax.numpy.issubdtype(dtype, jax.dtypes.extended) or np.dtype(dtype).kind in NOT_REAL

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping
 from typing import Any
 
@@ -29,7 +30,8 @@ class Recording(Kept, eqx.Module):
     Units and source are static: a jitted function that takes a whole recording is compiled again when they change, so
     `jaxveh.run` passes only the arrays to its compiled part.
 
-    **Raises** `InputError` for an empty log, channels of another length, non-monotonic or non-finite time.
+    **Raises** `InputError` for an empty log, channels of another length, non-monotonic or non-finite time, and for what is not a
+    real number: dates, differences of dates, complex numbers, text.
     """
 
     drawn_by = "recording"
@@ -41,8 +43,9 @@ class Recording(Kept, eqx.Module):
 
     def __init__(self, time, channels: Mapping[str, object], units: Mapping[str, str] | None = None, source: str = ""):
         # Time stamps of a long log need float64 even if everything else runs in float32: they stay on the host.
+        time = _numbers("time", time)
         self.time = time if isinstance(time, jax.Array) else np.asarray(time, dtype=np.float64)
-        self.channels = {str(name): _float(values) for name, values in channels.items()}
+        self.channels = {str(name): _float(str(name), values) for name, values in channels.items()}
         self.units = tuple(sorted((units or {}).items()))
         self.source = source
 
@@ -214,7 +217,47 @@ def _of_strangers(labelled: Labelled) -> Recording:
     return Recording(np.asarray(time.values), channels, units, labelled.source)
 
 
-def _float(values) -> jax.Array:
+def _float(name: str, values) -> jax.Array:
     if isinstance(values, jax.Array) and jnp.issubdtype(values.dtype, jnp.floating):
         return values
-    return jnp.asarray(np.asarray(values) if not isinstance(values, jax.Array) else values, dtype=float)
+    return jnp.asarray(_numbers(name, values), dtype=float)
+
+
+NO_NUMBERS = {
+    "M": 'dates: give seconds, e.g. ({0} - {0}[0]) / np.timedelta64(1, "s")',
+    "m": 'differences of dates: give seconds, e.g. {0} / np.timedelta64(1, "s")',
+    "c": "complex numbers: give np.real({0}), np.imag({0}) or np.abs({0})",
+    "U": "text: convert it, e.g. {0}.astype(float)",
+    "S": "text: convert it, e.g. {0}.astype(float)",
+    "V": "no numbers: convert them, or leave them out",
+}
+"""What values are that are no real numbers, and the remedy, by the kind of their NumPy type; {0}: their name."""
+
+
+def _numbers(name: str, values):
+    """The values as an array of real numbers, those of JAX as they are. **Raises** `InputError` for others, which NumPy would
+    convert without a word: dates to counts of their own unit, text to the number that it spells."""
+    if isinstance(values, jax.Array):
+        kind = "V" if jnp.issubdtype(values.dtype, jax.dtypes.extended) else np.dtype(values.dtype).kind
+    else:
+        values, kind = _on_the_host(values)
+    if kind in NO_NUMBERS:
+        raise InputError(f"recording: {name} must be real numbers; it holds {NO_NUMBERS[kind].format(name)}.")
+    return values
+
+
+def _on_the_host(values) -> tuple[Any, str]:
+    """The values as an array, and the kind of its type, of Python's objects that of what they are; None becomes NaN."""
+    try:
+        values = np.asarray(values)
+        kinds = {_kind_of(one) for one in values.flat} if values.dtype.kind == "O" else {values.dtype.kind}
+        wrong = [kind for kind in NO_NUMBERS if kind in kinds]
+        return (values, wrong[0]) if wrong else (np.asarray(values, np.float64), "f")
+    except (TypeError, ValueError):
+        return values, "V"
+
+
+def _kind_of(one) -> str:
+    if isinstance(one, datetime.date | datetime.timedelta):
+        return "M" if isinstance(one, datetime.date) else "m"
+    return np.asarray(one).dtype.kind

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, named
 from jaxveh._core.result import Result, code
 from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, gather, log_chosen, log_of
 from jaxveh.filters.looking_ahead import AbstractLookahead, lookahead_for, remark_of, soften
@@ -104,11 +104,11 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
     gradient: str = eqx.field(static=True, default="score")
 
     def __check_init__(self):
-        check_particle_settings(self.particles, self.threshold, self.gradient)
+        check_particle_settings(self.particles, self.threshold, self.gradient, self.resampling)
         check_ancestors("AuxiliaryParticleFilter", self.resampling, DRAW_INSTEAD)
         if not isinstance(self.lookahead, AbstractLookahead | None):
             raise InputError(
-                f"lookahead = {self.lookahead!r}: must be PredictiveLikelihood(), PointLookahead() or None (what the model "
+                f"lookahead = {named(self.lookahead)}: must be PredictiveLikelihood(), PointLookahead() or None (what the model "
                 "allows). Give a function as PointLookahead(function)."
             )
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jax.ad_checkpoint import checkpoint_name
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check
+from jaxveh._core.errors import InputError, check, named
 from jaxveh._core.result import Result
 from jaxveh.numerics import derivative_alone
 from jaxveh.statespace import kit
@@ -90,10 +90,22 @@ class AbstractDraw(AbstractResampling):
         return Resampled(gather(particles, ancestors), ancestors, chosen)
 
 
+def check_scheme(name: str, scheme: Any) -> None:
+    """Raise `InputError` unless `scheme` is a function, which an object or a class of schemes is not."""
+    if not callable(scheme) or isinstance(scheme, type):
+        raise InputError(
+            f"{name} = {named(scheme)}: must be a function (key, weights, n) -> ancestors such as numerics.systematic, or for a "
+            "filter's resampling an object such as filters.Soft(0.5)."
+        )
+
+
 class PlainDraw(AbstractDraw):
     """A draw by `scheme(key, weights, n) -> ancestors`, such as `numerics.systematic`; the weights after it are equal."""
 
     scheme: Callable = eqx.field(static=True, default=numerics.systematic)
+
+    def __check_init__(self):
+        check_scheme("resampling", self.scheme)
 
     def draw(self, key, weights, n):
         return self.scheme(key, weights, n)
@@ -116,6 +128,7 @@ class Soft(AbstractDraw):
 
     def __check_init__(self):
         check("Soft.share", self.share, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
+        check_scheme("Soft.scheme", self.scheme)
 
     def draw(self, key, weights, n):
         return self.scheme(key, self.share * weights + (1.0 - self.share) / weights.shape[0], n)
@@ -130,7 +143,7 @@ Scheme = AbstractResampling | Callable
 
 
 def as_resampling(scheme: Scheme) -> AbstractResampling:
-    """The scheme itself, or a `PlainDraw` of a function `(key, weights, n) -> ancestors`."""
+    """The scheme itself, or a `PlainDraw` of a function `(key, weights, n) -> ancestors`. **Raises** `InputError` for others."""
     return scheme if isinstance(scheme, AbstractResampling) else PlainDraw(scheme)
 
 

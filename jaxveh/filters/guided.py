@@ -147,7 +147,7 @@ class Guided(AbstractParticleFilter):
     gradient: str = eqx.field(static=True, default="score")
 
     def __check_init__(self):
-        check_particle_settings(self.particles, self.threshold, self.gradient)
+        check_particle_settings(self.particles, self.threshold, self.gradient, self.resampling)
         check_ancestors("Guided", self.resampling, DRAW_INSTEAD)
         check_one_of("rule", self.rule, RULES)
 

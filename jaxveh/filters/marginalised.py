@@ -175,7 +175,7 @@ class Marginalised(AbstractParticleFilter):
     gradient: str = eqx.field(static=True, default="score")
 
     def __check_init__(self):
-        check_particle_settings(self.particles, self.threshold, self.gradient)
+        check_particle_settings(self.particles, self.threshold, self.gradient, self.resampling)
         check_ancestors("Marginalised", self.resampling, DRAW_INSTEAD)
         if not self.linear:
             raise InputError("Marginalised.linear is empty: name the states that are linear given the others.")

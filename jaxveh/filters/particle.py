@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check_whole
+from jaxveh._core.errors import InputError, check, check_whole, kind_of_inner
 from jaxveh._core.result import Result, code
 from jaxveh.filters.choosing import AbstractResampling, Scheme, as_resampling, log_of
 from jaxveh.filters.particle_belief import ParticleBelief
@@ -73,18 +73,20 @@ def check_all_particles(who: str, filter: Any) -> None:
     """Raise `InputError` unless the filter's belief consists of weighted particles only."""
     if not isinstance(filter, AbstractParticleFilter) or kit.smoothing_of(filter) is not Smoothing.particles:
         raise InputError(
-            f"{who}: {type(filter).__name__} inside: must be a filter whose belief is particles only (ParticleFilter, "
+            f"{who}: {kind_of_inner(filter)} inside: must be a filter whose belief is particles only (ParticleFilter, "
             "AuxiliaryParticleFilter, Guided)."
         )
 
 
-def check_particle_settings(particles: int, threshold: float, gradient: str = "score") -> None:
-    """Raise `InputError` for fewer than two particles, a threshold outside [0, 1] or another gradient."""
+def check_particle_settings(
+    particles: int, threshold: float, gradient: str = "score", resampling: Scheme = numerics.systematic
+) -> None:
+    """Raise `InputError` for fewer than two particles, a threshold outside [0, 1], another gradient, or no resampling scheme."""
     if gradient not in ("score", "held"):
         raise InputError(f"gradient = {gradient!r}: must be 'score' or 'held'.")
     check_whole("particles", particles, 2)
-    if not 0 <= threshold <= 1:
-        raise InputError(f"threshold = {threshold}: must be from 0 (never resample) to 1 (every step).")
+    check("threshold", threshold, lambda v: (v >= 0) & (v <= 1), "from 0 (never resample) to 1 (every step)")
+    as_resampling(resampling)
 
 
 def log_prob(model: StateSpace, row, particles):
@@ -242,7 +244,7 @@ class AbstractProposalFilter(AbstractParticleFilter):
     gradient: str = eqx.field(static=True, default="score")
 
     def __check_init__(self):
-        check_particle_settings(self.particles, self.threshold, self.gradient)
+        check_particle_settings(self.particles, self.threshold, self.gradient, self.resampling)
 
     @abc.abstractmethod
     def propose(self, model: StateSpace, particles: Any, row: Row, dt: Any, key: Any) -> tuple[Any, Any]:

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check
 from jaxveh._core.recording import Recording
 from jaxveh.fitting.recorded import as_list
 from jaxveh.statespace import Row, StateSpace
@@ -29,11 +29,15 @@ class Segments(NamedTuple):
 def cut(model: StateSpace, recordings: Recording | Sequence[Recording], window: float) -> Segments:
     """Cut recordings into segments of `window` seconds (of the first recording's median step, which must be concrete).
 
-    Raises `InputError` for a window that is not positive, or shorter than two steps.
+    A window longer than every recording is as long as the longest. Raises `InputError` for one that is not positive, or shorter
+    than two steps.
     """
     recordings = as_list(recordings)
     time = np.asarray(recordings[0].time)
-    length = round(window / float(np.median(np.diff(time)))) if window > 0 and len(time) > 1 else 0
+    check("window", window, lambda _: True, "a time in seconds")
+    step = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
+    longest = max(len(recording) for recording in recordings)
+    length = round(min(window / step, max(longest, 2))) if window > 0 else 0
     if length < 2:
         raise InputError(f"window = {window} s: must span at least two steps of the recording.")
     parts = [cut_rows(model.rows(recording), length) for recording in recordings]

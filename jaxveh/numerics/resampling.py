@@ -6,6 +6,9 @@ Every scheme takes weights (N,), not negative and finite with a positive sum, no
 Cumulated weights are whole numbers: the sum has 2^30 (float32) or 2^52 (float64) parts. Sums of whole numbers are exact
 in any order, so that rounding cannot lose a particle, go past the last one, break the order, or choose a particle of
 zero weight; a weight below half a part counts as zero. Ancestors are integers: no gradient passes through them.
+
+A filter holds a scheme as a static field, which a copy or a pickle of the filter must equal. The public functions are
+therefore plain functions, which call compiled ones: what `jax.jit` returns is not equal to its copy, nor can it be pickled.
 """
 
 import math
@@ -22,9 +25,13 @@ from jaxveh.numerics.fences import fence
 from jaxveh.numerics.platform import on_cpu
 
 
-@partial(jax.jit, static_argnums=2, static_argnames="n")
 def systematic(key: Array, weights: Array, n: int | None = None) -> Array:
     """One uniform offset for all n strata (Kitagawa, 1996): each particle has its expected number of children, +- 1."""
+    return _systematic(key, weights, n)
+
+
+@partial(jax.jit, static_argnums=2, static_argnames="n")
+def _systematic(key: Array, weights: Array, n: int | None) -> Array:
     n = _size(weights, n)
     parts, total = _cumulated_parts(weights)
     offset = random.uniform(key, (), weights.dtype)
@@ -32,9 +39,13 @@ def systematic(key: Array, weights: Array, n: int | None = None) -> Array:
     return _ancestors(jnp.where(parts == total, n, jnp.ceil(position - offset).astype(jnp.int32)), n)
 
 
-@partial(jax.jit, static_argnums=2, static_argnames="n")
 def stratified(key: Array, weights: Array, n: int | None = None) -> Array:
     """One uniform offset for each of n strata (Kitagawa, 1996)."""
+    return _stratified(key, weights, n)
+
+
+@partial(jax.jit, static_argnums=2, static_argnames="n")
+def _stratified(key: Array, weights: Array, n: int | None) -> Array:
     n = _size(weights, n)
     parts, total = _cumulated_parts(weights)
     offsets = fence(random.uniform(key, (n,), weights.dtype))
@@ -46,17 +57,25 @@ def stratified(key: Array, weights: Array, n: int | None = None) -> Array:
     return _ancestors(jnp.where(parts == total, n, passed), n)
 
 
-@partial(jax.jit, static_argnums=2, static_argnames="n")
 def multinomial(key: Array, weights: Array, n: int | None = None) -> Array:
     """n independent draws in ascending order, by sorted uniform numbers from exponential spacings and a binary search."""
+    return _multinomial(key, weights, n)
+
+
+@partial(jax.jit, static_argnums=2, static_argnames="n")
+def _multinomial(key: Array, weights: Array, n: int | None) -> Array:
     n = _size(weights, n)
     parts, total = _cumulated_parts(weights)
     return _search(parts, _sorted_parts(key, n, jnp.asarray(n, jnp.int32), total, weights.dtype))
 
 
-@partial(jax.jit, static_argnums=2, static_argnames="n")
 def residual(key: Array, weights: Array, n: int | None = None) -> Array:
     """floor(n w_i) children of each particle, the others by multinomial draws from the remainders (Liu and Chen, 1998)."""
+    return _residual(key, weights, n)
+
+
+@partial(jax.jit, static_argnums=2, static_argnames="n")
+def _residual(key: Array, weights: Array, n: int | None) -> Array:
     n = _size(weights, n)
     expected = weights * (n / jnp.sum(weights))
     # An expected number just below a whole number by rounding counts as that whole number.
@@ -71,21 +90,29 @@ def residual(key: Array, weights: Array, n: int | None = None) -> Array:
     return _ancestors(_cumulative_sum(children), n)
 
 
-@jax.jit
 def ess(weights: Array) -> Array:
     """Effective sample size (sum w)^2 / sum w^2 of weights (N,), from 1 to N; 0 if all are zero (Kong et al., 1994)."""
+    return _ess(weights)
+
+
+@jax.jit
+def _ess(weights: Array) -> Array:
     square = sums.total(weights * weights)
     total = sums.total(weights)
     return jnp.where(square > 0.0, total * total / jnp.where(square > 0.0, square, 1.0), 0.0)
 
 
-@jax.jit
 def normalise(log_weights: Array) -> tuple[Array, Array, Array]:
     """From log weights (N,): weights that sum to 1, the logarithm of the mean weight, and whether any particle is alive.
 
     An entry that is not finite is dead and gets weight 0. If all entries are dead, the weights are uniform, the logarithm is
     -infinity and `alive` is False. Gradients are finite in every case, and zero with respect to dead entries.
     """
+    return _normalise(log_weights)
+
+
+@jax.jit
+def _normalise(log_weights: Array) -> tuple[Array, Array, Array]:
     count = log_weights.shape[-1]
     living = jnp.isfinite(log_weights)
     alive = jnp.any(living)

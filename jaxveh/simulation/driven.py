@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
@@ -123,6 +125,38 @@ def check_inputs(driven: Driven) -> None:
             f"{driver_name(driver)} gives {', '.join(given)}, but {vehicle_name(vehicle)} needs {', '.join(missing)} too: "
             "add the channel to the manoeuvre (or, for a_x, leave the car's cg_height out)."
         )
+
+
+SEVERAL = "For several drives at once use jax.vmap, e.g. jax.vmap(lambda car: simulate(car, manoeuvre))(cars)."
+"""The remedy where numbers have an axis."""
+
+
+def check_one_drive(what: str, tree: Any, evaluate: Callable[[], Any]) -> None:
+    """Raise `InputError` if numbers of the tree have an axis and `evaluate()` then gives no scalars. Tables pass."""
+    paths, _ = jtu.tree_flatten_with_path(eqx.filter(tree, eqx.is_inexact_array))
+    names = [f"{jtu.keystr(path).strip('.')} has shape {leaf.shape}" for path, leaf in paths if leaf.ndim > 0]
+    if not names:
+        return
+    try:
+        one = all(leaf.shape == () for leaf in jax.tree.leaves(eqx.filter_eval_shape(evaluate)))
+    except InputError:
+        raise
+    except (TypeError, ValueError):
+        one = False
+    if not one:
+        raise InputError(f"simulate: {what}: {', '.join(names)}: must be one number each. {SEVERAL}")
+
+
+def inputs_of(manoeuvre: Any, vehicle: AbstractVehicle) -> Any:
+    """The inputs at the start of a manoeuvre."""
+    driver, moves = as_driver(manoeuvre), _still(vehicle)
+    return driver.inputs(0.0, moves, driver.start(0.0, moves))
+
+
+def first_motion(driven: Driven) -> DrivenState:
+    """The state's derivative at the start."""
+    dtype = dtype_of(driven.car.vehicle)
+    return driven.derivatives(0.0, driven.start(0.0, dtype))
 
 
 def vehicle_name(vehicle: Any) -> str:

@@ -10,7 +10,7 @@ import diffrax
 import jax
 import numpy as np
 
-from jaxveh._core.errors import FilterError, InputError, JaxvehWarning, check_key, check_one_of, is_concrete
+from jaxveh._core.errors import FilterError, InputError, JaxvehWarning, check_key, check_one_of, is_concrete, named
 from jaxveh._core.names import as_mapping
 from jaxveh._core.parameter import strong
 from jaxveh._core.progress import Progress, silent
@@ -19,7 +19,17 @@ from jaxveh._core.result import Result
 from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre
 from jaxveh.sensors import AbstractDevice, Instrumented, SensorSet, Suite
 from jaxveh.simulation import stiffness
-from jaxveh.simulation.driven import Driven, check_inputs, driver_name, vehicle_name, with_pedals
+from jaxveh.simulation.driven import (
+    SEVERAL,
+    Driven,
+    check_inputs,
+    check_one_drive,
+    driver_name,
+    first_motion,
+    inputs_of,
+    vehicle_name,
+    with_pedals,
+)
 from jaxveh.simulation.events import Event
 from jaxveh.simulation.meter import meter_for
 from jaxveh.simulation.solve import Solution, even_grid, grid_through, solve
@@ -90,6 +100,9 @@ def simulate(
         check_key("simulate", key)
     driven = driven_car(car, manoeuvre, sensors if isinstance(sensors, SensorSet) else None, road)
     duration, values = driven.driver.duration, {} if start is None else as_mapping(start, "start")
+    for name, value in values.items():
+        if np.ndim(value) > 0:
+            raise InputError(f"simulate: start: {name} has shape {np.shape(value)}: must be one number. {SEVERAL}")
     rows = None if not isinstance(sensors, Suite) else device_rows(sensors, duration)
     grid = lambda step: even_grid(duration, dt, step) if rows is None else grid_through(rows, step)
     times = grid(max_step).rows
@@ -132,9 +145,14 @@ def _describe(what: Any) -> str:
 
 def driven_car(car: AbstractVehicle, manoeuvre: Any, sensors: SensorSet | None = None, road: Any = None) -> Driven:
     """The car on its road with sensors and driver, as `simulate` integrates it. Raises `InputError` if they do not fit."""
+    if not isinstance(car, AbstractVehicle):
+        order = " The order is simulate(car, manoeuvre)." if isinstance(manoeuvre, AbstractVehicle) else ""
+        raise InputError(f"simulate: car = {named(car)}: must be a car, such as vehicles.passenger_car().{order}")
     placed = _place_on_road(strong(car), road)
+    check_one_drive("manoeuvre", manoeuvre, lambda: inputs_of(manoeuvre, placed))
     driven = Driven(Instrumented(placed, sensors), with_pedals(manoeuvre, placed))
     check_inputs(driven)
+    check_one_drive("car", car, lambda: first_motion(driven))
     return driven
 
 

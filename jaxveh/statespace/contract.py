@@ -8,7 +8,7 @@ from typing import Any, ClassVar, final
 
 import equinox as eqx
 
-from jaxveh._core.errors import InputError, check_key
+from jaxveh._core.errors import InputError, check_key, kind_of_inner
 from jaxveh.numerics import apart
 from jaxveh.statespace.belief import AbstractBelief, Info
 from jaxveh.statespace.model import Row, StateSpace
@@ -148,6 +148,12 @@ class AbstractWrapper(AbstractFilter):
 
     inner: eqx.AbstractVar[AbstractFilter]
 
+    def __check_init__(self):
+        if not isinstance(self.inner, AbstractFilter):
+            raise InputError(
+                f"{type(self).__name__}: {kind_of_inner(self.inner)} inside: must be a filter, such as filters.Unscented()."
+            )
+
     @property
     def needs_key(self):
         return self.inner.needs_key
@@ -170,7 +176,7 @@ class AbstractTwoPartWrapper(AbstractTwoPartFilter, AbstractWrapper):
     def __check_init__(self):
         if not isinstance(self.inner, AbstractTwoPartFilter):
             raise InputError(
-                f"{type(self).__name__}: {type(self.inner).__name__} inside: must be a filter whose step is a prediction and an "
+                f"{type(self).__name__}: {kind_of_inner(self.inner)} inside: must be a filter whose step is a prediction and an "
                 "update (AbstractTwoPartFilter)."
             )
 

@@ -18,6 +18,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import FilterError, JaxvehWarning, check_one_of, is_concrete
 from jaxveh._core.estimated import Estimated
 from jaxveh._core.fresh_functions import note_function
+from jaxveh._core.names import as_names
 from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result, first_failure
@@ -101,7 +102,7 @@ def run(
     filter.check(model)
     note_function("run: transition", model.transition_function)
     note_function("run: observation", model.observation_function)
-    estimate = scan(filter, model, model.rows(recording), key, tuple(keep))
+    estimate = scan(filter, model, model.rows(recording), key, as_names(keep))
     estimate = dataclasses.replace(estimate, time=recording.time)
     if throw:
         raise_failure(estimate, filter, model, recording)
@@ -130,6 +131,7 @@ def scan_and_keep(
     filter: AbstractFilter, model: StateSpace, rows: Row, key, of_belief: Callable, keep: tuple[str, ...] = SHOWN
 ) -> tuple[Estimate, Any]:
     """The estimate, and `of_belief(belief)` of every row, with (T, ...) leaves."""
+    keep = as_names(keep)
     for name in keep:
         check_one_of("keep", name, (*SHOWN, *(f"info.{field}" for field in Info._fields)))
     form = functools.partial(scan_in_form, of_belief=of_belief, keep=keep)

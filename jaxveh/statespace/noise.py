@@ -67,9 +67,20 @@ class AbstractNoise(eqx.Module):
     def covariance(self) -> jax.Array:
         """(k, k) covariance in the order of `names`; raises `InputError` where the law has none."""
 
+    def factor(self) -> jax.Array:
+        """(k, k) lower factor L of the covariance L L^T; a field without any noise, as in a step of zero length, has zeros."""
+        return _factor(self.covariance())
+
     @abc.abstractmethod
     def times(self, factor) -> AbstractNoise:
         """The law of `factor` times the noise."""
+
+
+def _factor(covariance):
+    # A field of zero variance gets unit variance first: the Cholesky factor of a zero, and its derivative, are not finite.
+    still = jnp.diagonal(covariance) == 0
+    unit = jnp.where(still[:, None] & np.eye(len(still), dtype=bool), jnp.ones_like(covariance), covariance)
+    return jnp.where(still[:, None], jnp.zeros_like(covariance), numerics.cholesky(unit))
 
 
 def _levels():
@@ -133,7 +144,7 @@ class MultivariateGaussian(AbstractNoise):
     is_gaussian: ClassVar[bool] = True
     adds_up: ClassVar[bool] = True
     fields: tuple[str, ...] = eqx.field(static=True)
-    matrix: jax.Array = eqx.field(converter=lambda m: float_array(m if eqx.is_array(m) else np.asarray(m, dtype=float)))
+    matrix: jax.Array = eqx.field(converter=lambda m: float_array(m if eqx.is_array(m) else np.asarray(m)))
 
     def __check_init__(self):
         k = len(self.fields)
@@ -153,7 +164,7 @@ class MultivariateGaussian(AbstractNoise):
 
     def sample(self, key, shape=()):
         draws = numerics.normal(key, (len(self.fields), *shape), self.matrix.dtype)
-        correlated = jnp.tensordot(numerics.cholesky(self.matrix), draws, axes=1)
+        correlated = jnp.tensordot(self.factor(), draws, axes=1)
         return {name: correlated[i] for i, name in enumerate(self.fields)}
 
     def log_prob(self, residual, present):

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.bijectors import AbstractBijector
 from jaxveh._core.errors import InputError, did_you_mean, is_concrete
-from jaxveh._core.names import record_type
+from jaxveh._core.names import as_mapping, record_type
 from jaxveh._core.parameter import Parameter, Where, check_shares, pick, prior_spread, put, resolve, share_of
 from jaxveh._core.parameters import Parameters
 from jaxveh.statespace.dependent_noise import around
@@ -191,7 +191,17 @@ def parameters_of(model: StateSpace, report) -> Parameters | None:
 
 
 def put_parameters(model: StateSpace, report) -> Any:
-    """The system with the parameters of one report (physical scalars) put back: an ordinary car again."""
+    """The system with the parameters of one report (physical scalars) put back: an ordinary car again.
+
+    `report`: a NamedTuple or a mapping by field (`front_B`). **Raises** `InputError` if it lacks a parameter.
+    """
     if model.chosen is None:
         return model.system
-    return put(model.system, model.chosen.parameters, model.chosen.of_report(report).values())
+    given, fields = as_mapping(report, "put_parameters: report"), [p.field for p in model.chosen.parameters]
+    missing = [field for field in fields if field not in given]
+    if missing:
+        raise InputError(
+            f"put_parameters: report has {', '.join(map(str, given)) or 'no fields'}: must have {', '.join(missing)}, too: the "
+            f"parameters of this model are {', '.join(fields)}."
+        )
+    return put(model.system, model.chosen.parameters, [given[field] for field in fields])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import abc
 
 import equinox as eqx
-import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh.statespace.independent import combine
 from jaxveh.statespace.noise import AbstractNoise
@@ -22,7 +22,7 @@ class AbstractProcessNoise(eqx.Module):
 
     @abc.abstractmethod
     def over(self, dt) -> AbstractNoise:
-        """The law of the noise accumulated over `dt` seconds."""
+        """The law of the noise accumulated over `dt` seconds (zero or more)."""
 
 
 class Continuous(AbstractProcessNoise):
@@ -40,7 +40,7 @@ class Continuous(AbstractProcessNoise):
         return True
 
     def over(self, dt):
-        return self.law.times(jnp.sqrt(dt))
+        return self.law.times(numerics.sqrt(dt))  # whose derivative at zero is finite
 
 
 class Discrete(AbstractProcessNoise):

@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_finite
 from jaxveh._core.names import record
-from jaxveh.sweeps.sampling import Samples
+from jaxveh.sweeps.sampling import Samples, check_field_names
 
 
 class Axis(NamedTuple):
@@ -43,12 +43,16 @@ class Design:
     objects is an axis of choices. `latin_hypercube` and `sobol` make an axis of samples, each with several numbers. Without axes
     there is one point.
 
-    **Raises** `InputError` for an empty axis, numbers that are not finite, or a sequence of anything but numbers.
+    **Raises** `InputError` for a name that Python does not allow or that the seeds have (`seed`), an empty axis, numbers that are
+    not finite, or a sequence of anything but numbers.
     """
 
     axes: tuple[Axis, ...]
 
     def __init__(self, **axes: Sequence[float] | Mapping[str, Any] | Samples):
+        check_field_names("axis", axes)
+        if "seed" in axes:
+            raise InputError("axis seed: is the name of the seeds' own axis in every result; take another one.")
         self.axes = tuple(_axis(name, values) for name, values in axes.items())
 
     @property

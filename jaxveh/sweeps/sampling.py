@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import keyword
+import re
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +25,8 @@ def latin_hypercube(count: int, *, seed: int = 0, **ranges: tuple[float, float])
 
     `ranges`: (low, high) by name. The same `seed` gives the same points.
 
-    **Raises** `InputError` for no range, a range that is not finite and increasing, or a count below one.
+    **Raises** `InputError` for a name that Python does not allow, no range, a range that is not finite and increasing, or a count
+    below one.
     """
     from scipy.stats import qmc
 
@@ -43,8 +47,19 @@ def sobol(count: int, *, seed: int = 0, **ranges: tuple[float, float]) -> Sample
     return _scaled(qmc.Sobol(len(ranges) or 1, rng=seed), count, ranges)
 
 
+def check_field_names(what: str, names: Iterable[str]) -> None:
+    """Raise `InputError` unless every name can be a field of the point that a run gets."""
+    for name in names:
+        if name.isidentifier() and not keyword.iskeyword(name) and not name.startswith("_"):
+            continue
+        word = re.sub(r"\W+", "_", name).strip("_")
+        instead = f"{word}_" if keyword.iskeyword(word) else word if word.isidentifier() else f"x{word}"
+        raise InputError(f"{what} {name!r}: must be a name that Python allows, as in point.{instead}; write {instead}.")
+
+
 def _scaled(sampler, count: int, ranges: dict[str, tuple[float, float]]) -> Samples:
     check_whole("count", count)
+    check_field_names("range", ranges)
     if not ranges:
         raise InputError("samples: give a range, (low, high), for at least one name.")
     unit = sampler.random(int(count))

@@ -88,7 +88,12 @@ class AbstractDynamicTyre(AbstractTyre):
     `forces(contact, state)` needs the tyre's state, a NamedTuple of scalars with the fields `state_names`.
     """
 
-    state_names: eqx.AbstractVar[tuple[str, ...]]
+    # Not an `eqx.AbstractVar`: under postponed annotations that would be a field, which `Relaxed` would never set. A copy of a
+    # tyre with a field that is not set has another tree structure.
+    @property
+    @abc.abstractmethod
+    def state_names(self) -> tuple[str, ...]:
+        """The names of the tyre's states."""
 
     @abc.abstractmethod
     def start(self, contact: Contact) -> Any:

@@ -131,9 +131,19 @@ def with_batch_shape(outputs: Any) -> Any:
     """The same NamedTuple with all fields broadcast to a common shape: numbers and parameters are repeated for the batch."""
     leaves = jax.tree.leaves(outputs)
     shape = jnp.broadcast_shapes(*[jnp.shape(leaf) for leaf in leaves])
-    dtype = jnp.result_type(*[leaf for leaf in leaves if hasattr(leaf, "dtype")])
-    array = lambda leaf: leaf if hasattr(leaf, "dtype") else jnp.asarray(leaf, dtype)
+    dtype = dtype_of_strong(leaves)
+    array = lambda leaf: leaf if is_strong(leaf) else jnp.asarray(leaf, dtype)
     return jax.tree.map(lambda leaf: jnp.broadcast_to(array(leaf), shape), outputs)
+
+
+def is_strong(leaf: Any) -> bool:
+    """Whether a number has a dtype of its own, unlike Python's numbers and what JAX makes of them alone."""
+    return hasattr(leaf, "dtype") and not getattr(leaf, "weak_type", False)
+
+
+def dtype_of_strong(leaves: Any, default: Any = float) -> Any:
+    """The common dtype of the numbers that have one of their own; the `default` if none has."""
+    return jnp.result_type(*[leaf for leaf in leaves if is_strong(leaf)] or [default])
 
 
 def given_or_zero(state_type: Any, values: dict[str, Any], like: Any, parameter: Any) -> Any:

@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh.tyres import AbstractTyre, MFTyre
+from jaxveh.vehicles.base import dtype_of_strong
 
 
 def long_law(tyre: AbstractTyre) -> bool:
@@ -41,16 +42,18 @@ def together(function: Callable[..., Any], tyres: tuple, *per_wheel: tuple) -> l
     """
     n = len(tyres)
     shape = jnp.broadcast_shapes(*[jnp.shape(leaf) for leaf in jax.tree.leaves(per_wheel)])
-    stacked = [jax.tree.map(lambda *leaves: _stack(leaves, shape), *values) for values in per_wheel]
+    dtype = dtype_of_strong(jax.tree.leaves(per_wheel))
+    stacked = [jax.tree.map(lambda *leaves: _stack(leaves, shape, dtype), *values) for values in per_wheel]
     found = function(_one(tyres, len(shape)), *stacked)
     part = lambda leaf, i: jnp.broadcast_to(leaf, (n, *shape))[i] if eqx.is_array(leaf) else leaf
     return [jax.tree.map(lambda leaf, i=i: part(leaf, i), found) for i in range(n)]
 
 
-def _stack(leaves: tuple, shape: tuple) -> Any:
+def _stack(leaves: tuple, shape: tuple, dtype: Any) -> Any:
+    """The leaves along a new leading axis; Python numbers get the `dtype` of the other arrays, as they would in a formula."""
     if not any(eqx.is_array(leaf) for leaf in leaves) and all(leaf == leaves[0] for leaf in leaves):
         return leaves[0]
-    dtype = jnp.result_type(*[leaf for leaf in leaves if eqx.is_array(leaf)] or [float])
+    dtype = dtype_of_strong(leaves, dtype)
     return jnp.stack([jnp.broadcast_to(jnp.asarray(leaf, dtype), shape) for leaf in leaves])
 
 

@@ -1,13 +1,16 @@
 """A part of one's own that declares a parameter has it checked by its base, whatever it is derived from."""
 
+import inspect
 import re
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import InputError, manoeuvres, roads, tyres
+from jaxveh import InputError, manoeuvres, roads, statespace, tyres
+from jaxveh._core import errors
 from jaxveh.kit import positive
 
 # A manoeuvre is a function of time made by functions, which check what they are given.
@@ -35,3 +38,54 @@ def test_a_parameter_of_one_s_own_is_checked(name, size):
     assert own(BASES[name], 2.0).size == 2.0
     with pytest.raises(InputError, match=re.escape(f"Own.size = {size}: must be positive")):
         own(BASES[name], size)
+
+
+NO_NUMBERS = {
+    "text": "8.0",
+    "complex": 8j,
+    "an array of text": np.array("8.0"),
+    "a complex array": jnp.asarray(np.array(8j)),
+    "numbers and text": [8.0, "8.0"],
+    "lists of several lengths": [[8.0], [8.0, 8.0]],
+    "a mapping": {"size": 8.0},
+    "a class": float,
+    "a date": np.datetime64("2024-01-01"),
+}
+
+
+@pytest.mark.parametrize("kind", NO_NUMBERS)
+@pytest.mark.parametrize("name", BASES)
+def test_what_is_no_real_number_is_none_for_any_part(name, kind):
+    with pytest.raises(InputError, match=r"Own\.size = .*: must be a real number, positive and finite \(m\)"):
+        own(BASES[name], NO_NUMBERS[kind])
+
+
+CHECKS = {
+    name: function for name, function in vars(errors).items()
+    if name.startswith("check") and list(inspect.signature(function).parameters)[:2] == ["name", "value"]
+}  # fmt: skip
+MORE = {"check": (lambda v: v > 0, "positive"), "check_at_least": (1,), "check_one_of": ((1, 2),)}
+
+
+@pytest.mark.parametrize("kind", NO_NUMBERS)
+@pytest.mark.parametrize("name", CHECKS)
+def test_every_check_names_what_is_no_real_number(name, kind):
+    assert {"check", "check_positive", "check_finite", "check_at_least", "check_whole"} <= set(CHECKS)
+    with pytest.raises(InputError, match=r"the size = .*: must be"):
+        CHECKS[name]("the size", NO_NUMBERS[kind], *MORE.get(name, ()))
+
+
+LAWS = {
+    "Gaussian": lambda value: statespace.Gaussian({"a": value}),
+    "StudentT": lambda value: statespace.StudentT(value, {"a": 1.0}),
+    "CauchyGaussianMixture": lambda value: statespace.CauchyGaussianMixture(value, {"a": 1.0}, {"a": 1.0}),
+    "MultivariateGaussian": lambda value: statespace.MultivariateGaussian(("a",), [[value]]),
+}
+
+
+@pytest.mark.parametrize("value", ["0.5", 0.5j])
+@pytest.mark.parametrize("name", LAWS)
+def test_every_noise_law_takes_real_numbers(name, value):
+    assert LAWS[name](0.5).names == ("a",)
+    with pytest.raises(InputError, match=r"= .*: must be a real number, "):
+        LAWS[name](value)

@@ -258,7 +258,8 @@ CAR, STEP = vehicles.passenger_car(), manoeuvres.step_steer(25.0, 0.01)
     (lambda model, drive: jaxveh.run(filters.Extended(), CAR, drive), "model = SingleTrack: must be a StateSpace"),
     (lambda model, drive: jaxveh.run(filters.Extended(), model, {"a_y": 1.0}), "recording = dict: must be a Recording"),
     (lambda model, drive: filters.smooth(filters.Extended, model, drive), "is a class; make one of it"),
-    (lambda model, drive: jaxveh.simulate(STEP, CAR), "must be a manoeuvre"),
+    (lambda model, drive: jaxveh.simulate(STEP, CAR), r"car = StepSteer: .* The order is simulate\(car, manoeuvre\)"),
+    (lambda model, drive: jaxveh.simulate(CAR, CAR), "must be a manoeuvre"),
     (lambda model, drive: jaxveh.simulate(CAR, STEP, "esc"), r"such as sensors.esc\(\)"),
 ])  # fmt: skip
 def test_arguments_in_another_order_or_of_another_kind(call, words, model, drive):

@@ -1,5 +1,9 @@
 """Recordings: shapes, times, truth, selections, spans, filling on request, and errors that name the thing."""
 
+import datetime
+import decimal
+import warnings
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -92,6 +96,47 @@ def test_fill(method, max_gap, values, filled):
 def test_errors_name_the_thing(make_it, message):
     with pytest.raises(InputError, match=message):
         make_it()
+
+
+DATES = np.datetime64("2024-01-01", "ns") + np.arange(3) * np.timedelta64(100, "ms")
+NO_NUMBERS = {
+    "dates": (DATES, r"it holds dates: give seconds, e\.g\. \({0} - {0}\[0\]\) / np\.timedelta64\(1, \"s\"\)"),
+    "whole dates": (DATES.astype("datetime64[D]"), "it holds dates: give seconds"),
+    "Python's dates": ([datetime.datetime(2024, 1, 1, second=k) for k in range(3)], "it holds dates: give seconds"),
+    "differences": (DATES - DATES[0], r"it holds differences of dates: give seconds, e\.g\. {0} / np\.timedelta64"),
+    "Python's differences": ([datetime.timedelta(seconds=k) for k in range(3)], "it holds differences of dates"),
+    "complex": (np.arange(3) + 0j, r"it holds complex numbers: give np\.real\({0}\)"),
+    "complex, of JAX": (jnp.asarray(np.arange(3) + 0j), r"it holds complex numbers: give np\.real\({0}\)"),
+    "text": (["0", "1", "2"], r"it holds text: convert it, e\.g\. {0}\.astype\(float\)"),
+    "text among numbers": (np.array([0.0, "1", 2.0], object), "it holds text"),
+    "bytes": ([b"0", b"1", b"2"], "it holds text"),
+    "lists": ([[0.0], [1.0, 2.0], [3.0]], "it holds no numbers"),
+    "a mapping": ({"a": 1.0}, "it holds no numbers"),
+    "keys": (jax.random.split(jax.random.key(0), 3), "it holds no numbers"),
+}
+
+
+@pytest.mark.parametrize("kind", NO_NUMBERS)
+def test_what_is_no_real_number_is_refused_by_name(kind):
+    """NumPy would take dates as counts of their own unit, and a complex number's real part."""
+    values, message = NO_NUMBERS[kind]
+    with warnings.catch_warnings(action="error"):
+        with pytest.raises(InputError, match=r"recording: time must be real numbers; " + message.format("time")):
+            Recording(values, {"a": np.arange(3.0)})
+        with pytest.raises(InputError, match=r"recording: a must be real numbers; " + message.format("a")):
+            Recording(np.arange(3.0), {"a": values})
+        with pytest.raises(InputError, match=r"recording: b must be real numbers"):
+            Recording(np.arange(3.0), {}).replace(b=values)
+
+
+def test_every_kind_of_real_number_is_taken():
+    for values in (np.arange(3), [0, 1, 2], np.arange(3, dtype=np.uint8), np.arange(3, dtype=np.float16),
+                   [decimal.Decimal(k) for k in range(3)], (DATES - DATES[0]) / np.timedelta64(100, "ms")):  # fmt: skip
+        recording = Recording(values, {"a": values, "b": [None, True, 2]})
+        assert recording.time.dtype == np.float64 and recording["a"].dtype == jnp.float64
+        np.testing.assert_array_equal(recording.time, np.arange(3.0))
+        np.testing.assert_array_equal(recording["a"], np.arange(3.0))
+        np.testing.assert_array_equal(recording["b"], [NAN, 1.0, 2.0])
 
 
 def test_a_recording_passes_through_jit_and_vmap():

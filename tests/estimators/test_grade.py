@@ -117,6 +117,25 @@ def test_where_the_car_slides_the_grade_is_not_worse_than_a_level_road_and_the_s
         assert known.mean() > 0.5 and np.mean((error / std)[known] ** 2) < most, what
 
 
+def test_the_filter_hears_the_wheels_where_a_log_has_an_estimated_speed_too():
+    """Such a speed is late on hills. It is heard where the wheels are silent, and in reverse, where wheels may count forwards."""
+    method = grade.METHODS[grade.RECOMMENDED].make(CAR)
+    drive, _ = slippery(method.needs, "nothing")
+    late = np.interp(np.asarray(drive.time) - 0.5, np.asarray(drive.time), np.asarray(drive[WHEELS[0]]))
+    with_wheels = drive.without(*[name for name in ("v_x",) if name in drive])
+    told = drive.replace(v_x=late)
+    expected = grade.estimate(method, with_wheels)["grade"]
+    np.testing.assert_array_equal(grade.estimate(method, told)["grade"], expected)
+    alone = grade.estimate(method, told.without(*WHEELS))
+    assert np.isfinite(alone["grade"]).all() and np.abs(np.asarray(alone["grade"]) - expected).max() > 1e-4
+    row = {n.channel: jax.numpy.asarray(np.nan) for n in method.needs} | {
+        name: jax.numpy.asarray(2.0) for name in WHEELS
+    }
+    _, backwards = method.motion.first(jax.numpy.asarray(0.0), row | {"v_x": jax.numpy.asarray(-2.0)})
+    _, forwards = method.motion.first(jax.numpy.asarray(0.0), row | {"v_x": jax.numpy.asarray(2.5)})
+    assert (float(backwards["v_x"]), float(forwards["v_x"])) == (-2.0, 2.0)
+
+
 @pytest.mark.full
 def test_on_slippery_roads_no_unseen_car_is_worse_than_a_level_road():
     """Cars and seeds with which nothing was chosen; until a car has spun."""

@@ -193,7 +193,9 @@ def test_the_gradient_of_a_batch_in_parallel_is_that_of_its_runs():
     rows = complete_rows(rows)
 
     def total(noise, rows):
-        found = parallel.smooth_rows(filters.Kalman(), eqx.tree_at(lambda m: m.measurement_noise.std.y0, model, noise), rows)
+        found = parallel.smooth_rows(
+            filters.Kalman(), eqx.tree_at(lambda m: m.measurement_noise.std.y0, model, noise), rows
+        )
         return found.filtered.log_likelihood + jnp.sum(found.mean.x0)
 
     noise = jnp.asarray(0.5)

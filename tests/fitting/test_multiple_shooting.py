@@ -119,6 +119,14 @@ def _unstable(rows=200, dt=0.05):
     return ss.with_parameters(system, lambda m: m.system["a"], prior=1.0), recording
 
 
+@pytest.mark.parametrize("window", [1e9, np.inf])
+def test_a_window_longer_than_the_drive_is_the_drive(window):
+    one = drive(20, seed=5)
+    whole = len(one) * float(np.median(np.diff(one.time)))
+    found, expected = (multiple_shooting(model(), one, window=seconds) for seconds in (window, whole))
+    np.testing.assert_allclose(found.cost, expected.cost, rtol=1e-12)
+
+
 def test_short_windows_keep_an_unstable_system_from_exploding():
     system, recording = _unstable()
     fit = multiple_shooting(system, recording, window=0.25)
@@ -175,6 +183,7 @@ def test_segments_share_their_last_row_and_measure_each_row_once(recordings):
         (lambda: multiple_shooting(model(), drive(20), window=0.1), r"window = 0\.1 s: must span at least two steps"),
         (lambda: multiple_shooting(model(), drive(20), window=-1.0), r"window = -1\.0 s"),
         (lambda: multiple_shooting(model(), drive(20), window=np.nan), "window = nan s"),
+        (lambda: multiple_shooting(model(), drive(20), window="1"), r"window = '1': must be a real number"),
         (lambda: multiple_shooting(model(), drive(20), tie=0.0), r"tie = 0\.0: must be positive"),
         (
             lambda: multiple_shooting(

@@ -106,3 +106,57 @@ def test_stamps_that_are_one_in_float32_are_refused():
     close = sensors.Suite((sensors.GNSS(rate=1.0), sensors.IMU(rate=1.0, phase=1e-6)))
     with pytest.raises(InputError, match=r"rows at t = \d+ s and 1e-06 s later coincide in float32"):
         simulate(car, long, close, max_step=0.1)
+
+
+@pytest.mark.parametrize(
+    ("car", "shown"),
+    [
+        (vehicles.SingleTrack, "the class SingleTrack"),
+        (None, "None"),
+        ("passenger_car", "'passenger_car'"),
+        (roads.Level(0.8), "Level"),
+    ],
+)
+def test_a_car_that_is_none_is_refused(car, shown):
+    with pytest.raises(
+        InputError, match=rf"simulate: car = {shown}.*: must be a car, such as vehicles\.passenger_car\(\)"
+    ):
+        simulate(car, STEER)
+
+
+def several(leaf):
+    return jnp.stack([leaf, 1.01 * leaf])
+
+
+@pytest.mark.parametrize("make", [linear, vehicles.passenger_car, lambda: Travelling(linear(), roads.Level(0.8))])
+def test_every_number_of_a_car_is_one(make):
+    """Of several cars in one the drive would fail somewhere inside; in a batch each has its own."""
+    leaves, tree = jax.tree.flatten(make())
+    for i, leaf in enumerate(leaves):
+        car = jax.tree.unflatten(tree, [*leaves[:i], several(leaf), *leaves[i + 1 :]])
+        with pytest.raises(
+            InputError, match=r"simulate: car: .* has shape \(2,\): must be one number each.* jax\.vmap"
+        ):
+            simulate(car, STEER, dt=0.1)
+
+
+@pytest.mark.parametrize("leaf", ["speed", "steer"])
+def test_every_number_of_a_manoeuvre_is_one(leaf):
+    for values in (np.array([20.0, 21.0]), jnp.asarray([0.01, 0.02])):
+        manoeuvre = eqx.tree_at(lambda m: getattr(m, leaf), STEER, jnp.asarray(values))
+        with pytest.raises(
+            InputError, match=rf"simulate: manoeuvre: .*{leaf} has shape \(2,\): must be one number each"
+        ):
+            simulate(linear(), manoeuvre, dt=0.1)
+
+
+def test_a_start_is_one_state():
+    with pytest.raises(InputError, match=r"simulate: start: yaw_rate has shape \(3,\): must be one number.* jax\.vmap"):
+        simulate(linear(), STEER, start={"yaw_rate": np.zeros(3)})
+
+
+def test_a_batch_of_cars_and_manoeuvres_drives():
+    cars, manoeuvres_ = jax.tree.map(several, linear()), jax.tree.map(several, STEER)
+    drives = jax.vmap(lambda car, manoeuvre: simulate(car, manoeuvre, dt=0.25)["true.yaw_rate"])(cars, manoeuvres_)
+    alone = simulate(jax.tree.map(lambda leaf: leaf[1], cars), jax.tree.map(lambda leaf: leaf[1], manoeuvres_), dt=0.25)
+    np.testing.assert_allclose(drives[1], alone["true.yaw_rate"], rtol=1e-6, atol=1e-9)

@@ -79,6 +79,16 @@ def test_the_joint_model_is_the_plain_one_with_these_parameters():
     np.testing.assert_allclose(put_parameters(model, shown)["car"].engine.gain, 3.0, rtol=1e-14)
     assert jax.tree.structure(put_parameters(model, shown)) == jax.tree.structure(plain.system)
     assert put_parameters(plain, None) is plain.system
+    fields = shown._asdict()
+    assert put_parameters(model, fields)["car"].engine.gain == put_parameters(model, shown)["car"].engine.gain
+    own = [p.field for p in model.chosen.parameters]
+    for field in own:
+        for wrong in ({}, {field.replace("_", "."): 1.0}, {field.upper(): 1.0}):
+            given = {name: value for name, value in fields.items() if name != field} | wrong
+            with pytest.raises(InputError, match=rf"report has .*must have {field}, too: .* {', '.join(own)}\."):
+                put_parameters(model, given)
+    with pytest.raises(InputError, match="put_parameters: report = float: must be a NamedTuple or a mapping"):
+        put_parameters(model, 9.0)
 
 
 @pytest.fixture(scope="module")

@@ -59,6 +59,8 @@ MISTAKES = [
     (lambda: sweeps.latin_hypercube(4), "give a range"),
     (lambda: sweeps.latin_hypercube(4, x=(1, 1)), r"x = \(1, 1\): must be \(low, high\)"),
     (lambda: sweeps.sobol(4, x=(0, np.inf)), "x = "),
+    (lambda: sweeps.sobol(4, **{"front.B": (0, 1)}), r"range 'front\.B': must be a name .* write front_B\."),
+    (lambda: sweeps.latin_hypercube(4, **{"class": (0, 1)}), r"range 'class': .* write class_\."),
     (lambda: sweeps.sobol(4, x=3.0), "x = 3.0"),
     (lambda: sweeps.sobol(600, x=(0, 1)), "count = 600: .* take 512 or 1024"),
 ]

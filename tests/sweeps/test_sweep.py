@@ -1,6 +1,7 @@
 """A sweep's arrays stand where the design says, whatever the chunks, the memory and the devices."""
 
 import functools
+import re
 import subprocess
 import sys
 import textwrap
@@ -205,3 +206,26 @@ def test_two_devices_make_what_one_makes():
 def test_mistakes_are_named(call, message):
     with pytest.raises(InputError, match=message):
         call()
+
+
+@pytest.mark.parametrize(
+    ("name", "instead"),
+    [
+        ("front.B", "front_B"),
+        ("a b", "a_b"),
+        ("class", "class_"),
+        ("_x", "x"),
+        ("2x", "x2x"),
+        ("", "x"),
+        ("F_x [N]", "F_x_N"),
+    ],
+)
+def test_a_name_that_no_point_can_have_is_refused_with_another(name, instead):
+    with pytest.raises(InputError, match=f"axis {re.escape(repr(name))}: .* as in point.{instead}; write {instead}"):
+        sweeps.Design(**{name: [1.0]})
+    assert sweeps.Design(**{instead: [1.0]}).axes[0].name == instead
+
+
+def test_the_seeds_own_axis_is_refused():
+    with pytest.raises(InputError, match="axis seed: is the name of the seeds' own axis"):
+        sweeps.Design(seed=[1.0])

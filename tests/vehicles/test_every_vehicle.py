@@ -385,6 +385,20 @@ def test_a_batch_and_vmap_equal_single_cars(name):
 
 
 @pytest.mark.parametrize("name", CARS)
+@pytest.mark.parametrize(
+    "kind", [float, lambda value: jnp.asarray(float(value)), lambda value: np.asarray(value, np.float32)]
+)
+def test_float32_stays_float32_on_a_rough_ground(name, kind):
+    """Whatever the ground's numbers are, without a dtype of their own or in float32. Traced and not run."""
+    single, (x, u) = statespace.cast(made(name), np.float32), stirred(name)
+    x, u = jax.tree.map(lambda leaf: jnp.asarray(leaf, np.float32), (x, u))
+    for ground in (LEVEL, ROUGH):
+        ground = jax.tree.map(kind, ground)
+        found = jax.eval_shape(lambda x, u: single.evaluate(jnp.zeros((), np.float32), x, u, ground), x, u)  # noqa: B023
+        assert {leaf.dtype for leaf in jax.tree.leaves(found)} == {np.dtype(np.float32)}
+
+
+@pytest.mark.parametrize("name", CARS)
 def test_outputs_have_the_shape_of_the_batch(name):
     """All of them, loads that nothing moves and inputs that all share included; the rates of a batch of states likewise."""
     car, (x, u) = made(name), stirred(name)

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, JaxvehWarning
+from jaxveh._core.errors import InputError, JaxvehWarning, check, kind_of_inner, named
 from jaxveh._core.names import record
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
@@ -107,6 +107,11 @@ class AbstractRuleFilter(AbstractGaussianFilter):
                 raise InputError(
                     f"{kind}.{entry.name} = {form}(): is a form; pass it by keyword, {kind}(form={form}())."
                 )
+            if isinstance(entry.default, int | float) and not isinstance(entry.default, bool):
+                check(f"{type(self).__name__}.{entry.name}", value, lambda _: True, f"such as {entry.default}")
+        if not isinstance(self.form, AbstractForm):
+            name, form = type(self).__name__, named(self.form)
+            raise InputError(f"{name}.form = {form}: must be a form, Covariance(), SquareRoot() or SingularValues().")
 
     @property
     def gradients(self):
@@ -211,7 +216,9 @@ def check_kind(who: str, filter: Any, kind: type) -> None:
     """Raise `InputError` unless the filter is of the kind that a wrapper can wrap."""
     if not isinstance(filter, kind):
         what = "an unwrapped Gaussian filter" if kind is AbstractRuleFilter else "a Gaussian filter"
-        raise InputError(f"{who}: {type(filter).__name__} inside: must be {what} (Kalman, Extended, Unscented, ...).")
+        raise InputError(
+            f"{who}: {kind_of_inner(filter)} inside: must be {what} (Kalman(), Extended(), Unscented(), ...)."
+        )
 
 
 def check_gaussian(who: str, what: str, law: AbstractNoise, advice: str = "Use ParticleFilter.") -> None:

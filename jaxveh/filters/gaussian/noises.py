@@ -7,7 +7,6 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from jaxveh import numerics
 from jaxveh.filters.gaussian.rules import times
 from jaxveh.statespace import AbstractNoise, Gaussian, Row, StateDependent, StateSpace
 
@@ -34,7 +33,7 @@ def factor_in(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:
     embed = _embedding_matrix(law, fields, dtype)
     if isinstance(law, Gaussian):
         return embed * jnp.stack(law.std)
-    return times(embed, numerics.cholesky(law.covariance()))
+    return times(embed, law.factor())
 
 
 def _embedding_matrix(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:

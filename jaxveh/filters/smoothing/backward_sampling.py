@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh.filters.choosing import log_of
-from jaxveh.filters.particle import AbstractParticleFilter
+from jaxveh.filters.particle import SHORTEST, AbstractParticleFilter
 from jaxveh.filters.smoothing.genealogy import path_moments
 from jaxveh.filters.smoothing.path_smoother import AbstractPathSmoother
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
@@ -63,7 +63,7 @@ def sample_backwards(filter: AbstractParticleFilter, model: StateSpace, rows: Ro
         ((particles, weights, row), following), key = given
         u = model.step_inputs(row.t, following.t, row.u, following.u)
         moved = model.transition(row.t, following.t, particles, u)
-        law = noise.over(following.t - row.t)
+        law = noise.over(jnp.maximum(following.t - row.t, SHORTEST))
         names = noise.law.names
         residual = {name: getattr(later, name)[:, None] - getattr(moved, name) for name in names}
         density = law.log_prob(residual, dict.fromkeys(names, jnp.asarray(True)))

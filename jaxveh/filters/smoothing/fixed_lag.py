@@ -49,6 +49,7 @@ class FixedLag(AbstractWrapper):
         return Gradient.exact
 
     def __check_init__(self):
+        super().__check_init__()
         check_lag(self.inner, self.lag)
 
     def check(self, model):

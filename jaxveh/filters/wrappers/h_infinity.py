@@ -28,7 +28,7 @@ class HInfinity(AbstractStateless):
     """
 
     inner: AbstractRuleFilter
-    bound: jax.Array = eqx.field(converter=lambda v: float_array(v if eqx.is_array(v) else np.asarray(v, float)))
+    bound: jax.Array = eqx.field(converter=lambda v: float_array(v if eqx.is_array(v) else np.asarray(v)))
     scales: tuple[tuple[str, float], ...] = eqx.field(static=True, converter=lambda v: tuple(dict(v).items()))
 
     def __check_init__(self):

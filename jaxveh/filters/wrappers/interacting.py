@@ -84,10 +84,10 @@ class InteractingModels(AbstractWrapper):
     noise_by_row: ClassVar[bool] = True
     inner: AbstractRuleFilter
     variants: tuple[Callable[[StateSpace], StateSpace], ...] = eqx.field(static=True)
-    transition: jax.Array = eqx.field(converter=lambda m: float_array(m if eqx.is_array(m) else np.asarray(m, float)))
+    transition: jax.Array = eqx.field(converter=lambda m: float_array(m if eqx.is_array(m) else np.asarray(m)))
     start: jax.Array | None = eqx.field(
         default=None,
-        converter=lambda v: None if v is None else float_array(v if eqx.is_array(v) else np.asarray(v, float)),
+        converter=lambda v: None if v is None else float_array(v if eqx.is_array(v) else np.asarray(v)),
     )
 
     @property

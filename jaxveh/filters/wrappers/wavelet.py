@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check, check_one_of
+from jaxveh._core.errors import InputError, check, check_one_of, kind_of_inner
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.filters.particle import AbstractParticleFilter
 from jaxveh.filters.wrappers.base import (
@@ -96,7 +96,7 @@ class HaarParticles(AbstractHaar):
 
     def __check_init__(self):
         if not isinstance(self.inner, AbstractParticleFilter):
-            kind = type(self.inner).__name__
+            kind = kind_of_inner(self.inner)
             raise InputError(
                 f"HaarParticles: {kind} inside: must be a particle filter. For Gaussian filters use HaarNoise."
             )
@@ -141,10 +141,8 @@ def check_settings(settings: Any) -> None:
     check(f"{who}.forgetting", settings.forgetting, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
     check(f"{who}.floor", settings.floor, lambda v: (v > 0) & (v <= 1), "above 0 and at most 1")
     check(f"{who}.ceiling", settings.ceiling, lambda v: v >= 1, "at least 1")
-    if settings.fewest is not None and not 2 <= settings.fewest <= settings.window:
-        raise InputError(
-            f"{who}.fewest = {settings.fewest}: must be from 2 to the window, {settings.window}; None: the whole window."
-        )
+    inside = f"from 2 to the window, {settings.window}; None: the whole window"
+    check(f"{who}.fewest", settings.fewest, lambda v: (v >= 2) & (v <= settings.window), inside)
     within = lambda v: (v >= settings.floor) & (v <= settings.ceiling)
     check(f"{who}.initial", settings.initial, within, f"from floor, {settings.floor}, to ceiling, {settings.ceiling}")
 

@@ -1,0 +1,23 @@
+"""Every tyre equals its copies and what a pickle of it gives back, alone and in a lag."""
+
+import pytest
+from copies import check_copies, unset_fields
+from families import left_out
+from test_every_dynamic_tyre import TYRES as DYNAMIC
+from test_every_tyre import LAWS
+
+from jaxveh import tyres
+
+ALL = {**{name: law.make for name, law in LAWS.items()}, **{f"{name}, dynamic": make for name, make in DYNAMIC.items()}}
+ALL |= {f"{name}, relaxed": lambda make=law.make: tyres.Relaxed(make(), None, 0.4) for name, law in LAWS.items()}
+
+
+def test_every_tyre_is_here():
+    assert not left_out("tyres", tyres.AbstractTyre, [make() for make in ALL.values()], {})
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_it_equals_its_copies(name):
+    value = ALL[name]()
+    check_copies(value)
+    assert not unset_fields(value)
