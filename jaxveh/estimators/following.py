@@ -17,6 +17,9 @@ from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable, Answer,
 from jaxveh.estimators.sequential import Belief
 from jaxveh.numerics import apart
 
+CONTRADICTS = 3.0
+"""Mean square of the news of later rows over their expected spread, by component, from which they contradict a row."""
+
 LITTLE = 1e3
 """Epsilons that a correlation of 1 is increased by: rounding leaves less."""
 
@@ -95,16 +98,24 @@ def smooth_rows(method: AbstractSmoothable, time: Any, values: dict[str, Any]) -
 
 
 def _given_later(method: AbstractSmoothable, memory: Any, t: Any, values: dict[str, Any], later: Belief) -> Belief:
-    """The belief of a row, given the smoothed belief `later` of the next row, which has these values."""
+    """The belief of a row, given the smoothed belief `later` of the next row, which has these values.
+
+    Where `later` contradicts this row's belief, as after a spin that the model does not know, it counts as one of two
+    possibilities, and the less the further off it is (`CONTRADICTS`)."""
     mean, covariance = memory.belief
     ahead = lambda mean, covariance: method.ahead(memory._replace(belief=Belief(mean, covariance)), t, values)
     slope = jax.jacfwd(lambda mean: ahead(mean, covariance).mean)(mean)
     predicted, noise = ahead(mean, covariance), ahead(mean, jnp.zeros_like(covariance)).covariance
-    gain = _solve(predicted.covariance, slope @ covariance).T
+    news = later.mean - predicted.mean
+    solved = _solve(predicted.covariance, jnp.concatenate([slope @ covariance, news[:, None]], axis=1))
+    gain, distance = solved[:, :-1].T, news @ solved[:, -1]
+    share = 1.0 / jnp.maximum(distance / (CONTRADICTS * mean.shape[0]), 1.0)
     # As Joseph's form, positive however large the differences are.
     left = jnp.eye(mean.shape[0], dtype=mean.dtype) - gain @ slope
-    spread = left @ covariance @ left.T + gain @ (later.covariance + noise) @ gain.T
-    return Belief(mean + gain @ (later.mean - predicted.mean), numerics.symmetric(spread))
+    told = left @ covariance @ left.T + gain @ (later.covariance + noise) @ gain.T
+    shift = gain @ news
+    spread = share * told + (1.0 - share) * (covariance + share * jnp.outer(shift, shift))
+    return Belief(mean + share * shift, numerics.symmetric(spread))
 
 
 def _solve(covariance: Any, b: Any) -> Any:
