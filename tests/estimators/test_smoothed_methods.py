@@ -119,10 +119,6 @@ def test_it_is_finite_whatever_the_log_lacks_and_ends_as_the_method_does(quantit
             assert np.isfinite(mean).all() and (std[known] >= 0.0).all(), (variant, field)
             np.testing.assert_allclose(mean[-1], of(live.mean, field)[-1], rtol=1e-9, atol=1e-12)
             np.testing.assert_allclose(std[-1], of(live.std, field)[-1], rtol=1e-9, atol=1e-12)
-        # Unless later rows contradict it, what all rows say is not wider; a stiffness' width is a share of it.
-        if variant in ("plain", "another") and quantity != "stiffness":
-            for field in QUANTITIES[quantity].SHOWN:
-                assert np.mean(of(smoothed.std, field)) < 1.001 * np.mean(of(live.std, field)), (variant, field)
 
 
 @pytest.mark.parametrize(("quantity", "name"), [one for one in SMOOTHABLE if one[0] in ("bank", "grade", "roll")])
