@@ -65,7 +65,7 @@ def check_at_least(name: str, value, least, advice: str = "") -> None:
     check(name, value, lambda v: v >= least, f"at least {least}", advice)
 
 
-def named(value) -> str:
+def word_for(value) -> str:
     """Return a value of a wrong type as a message shows it: words and numbers as they are, others by their type."""
     if value is None or isinstance(value, str | bool | int | float | complex):
         return repr(value)

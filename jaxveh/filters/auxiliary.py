@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, named
+from jaxveh._core.errors import InputError, word_for
 from jaxveh._core.result import Result, code
 from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, gather, log_chosen, log_of
 from jaxveh.filters.looking_ahead import AbstractLookahead, lookahead_for, remark_of, soften
@@ -108,8 +108,8 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         check_ancestors("AuxiliaryParticleFilter", self.resampling, DRAW_INSTEAD)
         if not isinstance(self.lookahead, AbstractLookahead | None):
             raise InputError(
-                f"lookahead = {named(self.lookahead)}: must be PredictiveLikelihood(), PointLookahead() or None (what the model "
-                "allows). Give a function as PointLookahead(function)."
+                f"lookahead = {word_for(self.lookahead)}: must be PredictiveLikelihood(), PointLookahead() or None (what the "
+                "model allows). Give a function as PointLookahead(function)."
             )
 
     def check(self, model):

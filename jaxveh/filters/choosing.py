@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jax.ad_checkpoint import checkpoint_name
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check, named
+from jaxveh._core.errors import InputError, check, word_for
 from jaxveh._core.result import Result
 from jaxveh.numerics import derivative_alone
 from jaxveh.statespace import kit
@@ -94,8 +94,8 @@ def check_scheme(name: str, scheme: Any) -> None:
     """Raise `InputError` unless `scheme` is a function, which an object or a class of schemes is not."""
     if not callable(scheme) or isinstance(scheme, type):
         raise InputError(
-            f"{name} = {named(scheme)}: must be a function (key, weights, n) -> ancestors such as numerics.systematic, or for a "
-            "filter's resampling an object such as filters.Soft(0.5)."
+            f"{name} = {word_for(scheme)}: must be a function (key, weights, n) -> ancestors such as numerics.systematic, or for "
+            "a filter's resampling an object such as filters.Soft(0.5)."
         )
 
 

@@ -10,7 +10,7 @@ import diffrax
 import jax
 import numpy as np
 
-from jaxveh._core.errors import FilterError, InputError, JaxvehWarning, check_key, check_one_of, is_concrete, named
+from jaxveh._core.errors import FilterError, InputError, JaxvehWarning, check_key, check_one_of, is_concrete, word_for
 from jaxveh._core.names import as_mapping
 from jaxveh._core.parameter import strong
 from jaxveh._core.progress import Progress, silent
@@ -147,7 +147,7 @@ def driven_car(car: AbstractVehicle, manoeuvre: Any, sensors: SensorSet | None =
     """The car on its road with sensors and driver, as `simulate` integrates it. Raises `InputError` if they do not fit."""
     if not isinstance(car, AbstractVehicle):
         order = " The order is simulate(car, manoeuvre)." if isinstance(manoeuvre, AbstractVehicle) else ""
-        raise InputError(f"simulate: car = {named(car)}: must be a car, such as vehicles.passenger_car().{order}")
+        raise InputError(f"simulate: car = {word_for(car)}: must be a car, such as vehicles.passenger_car().{order}")
     placed = _place_on_road(strong(car), road)
     check_one_drive("manoeuvre", manoeuvre, lambda: inputs_of(manoeuvre, placed))
     driven = Driven(Instrumented(placed, sensors), with_pedals(manoeuvre, placed))

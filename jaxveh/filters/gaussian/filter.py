@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, JaxvehWarning, check, kind_of_inner, named
+from jaxveh._core.errors import InputError, JaxvehWarning, check, kind_of_inner, word_for
 from jaxveh._core.names import record
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
@@ -110,7 +110,7 @@ class AbstractRuleFilter(AbstractGaussianFilter):
             if isinstance(entry.default, int | float) and not isinstance(entry.default, bool):
                 check(f"{type(self).__name__}.{entry.name}", value, lambda _: True, f"such as {entry.default}")
         if not isinstance(self.form, AbstractForm):
-            name, form = type(self).__name__, named(self.form)
+            name, form = type(self).__name__, word_for(self.form)
             raise InputError(f"{name}.form = {form}: must be a form, Covariance(), SquareRoot() or SingularValues().")
 
     @property
