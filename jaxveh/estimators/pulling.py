@@ -100,7 +100,7 @@ class Pulling(AbstractSmoothable):
     a_x_offset: jax.Array = parameter("m/s^2", scale=0.1, default=0.0)
     a_x_offset_spread: jax.Array = positive("m/s^2", default=0.06)
     rolling_spread: jax.Array = positive("m/s^2", default=0.025)
-    wheel_noise: jax.Array = positive("m/s", default=0.012)
+    wheel_noise: jax.Array = positive("m/s", default=0.03)
     told_noise: jax.Array = positive("m/s", default=0.05)
     wheel_delay: jax.Array = parameter("s", scale=0.02, default=0.02)
     satellite_noise: jax.Array = positive("m/s", default=0.06)
