@@ -115,7 +115,9 @@ def _lateral(log: LogView) -> LogFinding:
         return _judge(log, "a_y", "v_x yaw_rate + dv_y/dt", reference, "", EXACT)
     if log.car is not None:
         reference = _a_y_expected(log, log.car)
-        return _judge(log, "a_y", "the prediction of the car's linear model from yaw_rate", reference, "", MODELLED)
+        return _judge(
+            log, "a_y", "the prediction of the car's linear model from yaw_rate", reference, "", MODELLED, STIFFNESSES
+        )
     caveat = " Without v_y or a car, this includes the sideslip's own lag of up to 0.2 s at speed."
     return _judge(log, "a_y", "v_x yaw_rate", speed * yaw_rate, caveat, np.inf)
 
@@ -149,11 +151,13 @@ def _steering(log: LogView) -> LogFinding:
     if understeer_gradient(log.car) < 0.0:
         caveat = " The car's file oversteers: such a car answers late at speed."
         return _judge(log, "yaw_rate", "the prediction of the car's linear model from steer", expected, caveat, np.inf)
-    return _judge(log, "yaw_rate", "the prediction of the car's linear model from steer", expected, "", MODELLED)
+    return _judge(
+        log, "yaw_rate", "the prediction of the car's linear model from steer", expected, "", MODELLED, STIFFNESSES
+    )
 
 
 def _judge(
-    log: LogView, name: str, other: str, reference: np.ndarray, caveat: str, tolerance: float, alike: str = STIFFNESSES
+    log: LogView, name: str, other: str, reference: np.ndarray, caveat: str, tolerance: float, alike: str = ""
 ) -> LogFinding:
     # The same symmetric average on both sides removes noise and delays neither.
     found = delay(log.smooth(reference, SMOOTH), log.smooth(log.even(name), SMOOTH), log.step)
@@ -170,7 +174,7 @@ def _judge(
     if np.isinf(tolerance):
         return LogFinding("note", name, words, values)
     advice = "Shift the channel by this delay before estimating."
-    if tolerance == MODELLED and size < DOUBTFUL:
+    if alike and size < DOUBTFUL:
         advice = f"{alike} look alike: shift the channel only if you know that it is late."
     return LogFinding("warning", name, f"{words} {advice}", values)
 

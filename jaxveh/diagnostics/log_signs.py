@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from jaxveh.diagnostics.log_findings import GRAVITY, LogFinding, LogView, fit
+from jaxveh.diagnostics.log_steering import GENTLE
 
 AGREE = 0.5
 """Correlation above which two channels count as related."""
@@ -64,9 +65,6 @@ def check_wheel_speeds(log: LogView) -> list[LogFinding]:
 
 
 _SAME = (0.8, 1.25)
-
-GENTLE = 3.0
-"""Lateral acceleration up to which no car slides, on any road but ice, m/s^2."""
 
 
 def _wheels_over_speed(log: LogView) -> float | None:

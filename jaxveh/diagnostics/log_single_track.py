@@ -41,7 +41,7 @@ def a_y_from_yaw_rate(car: CarSpecification, yaw_rate: np.ndarray, v_x: np.ndarr
     a_y = v_x r + dv_y/dt with v_y = b r - v_x (a m a_y - I_z dr/dt) / (L C_r): v_x r + b dr/dt, delayed by about
     v_x a m / (L C_r) seconds. Inputs must be finite; the inertial term is small and omitted.
     """
-    delay = v_x * car.front_axle_to_cg * car.mass / (car.wheelbase * float(car.rear_cornering_stiffness or 0))
+    delay = v_x * rear_softness(car)
     drive = v_x * yaw_rate + car.rear_axle_to_cg * np.gradient(yaw_rate, step)
     a_y = np.empty_like(drive)
     value = drive[0]
@@ -54,8 +54,12 @@ def a_y_from_yaw_rate(car: CarSpecification, yaw_rate: np.ndarray, v_x: np.ndarr
 
 def steady_v_y(car: CarSpecification, yaw_rate: np.ndarray, v_x: np.ndarray) -> np.ndarray:
     """Return v_y (N,) in m/s in a steady turn of the linear single track with this yaw rate (N,) in rad/s."""
-    softness = car.mass * car.front_axle_to_cg / (car.wheelbase * float(car.rear_cornering_stiffness or np.inf))
-    return (car.rear_axle_to_cg - softness * v_x * np.abs(v_x)) * yaw_rate
+    return (car.rear_axle_to_cg - rear_softness(car) * v_x * np.abs(v_x)) * yaw_rate
+
+
+def rear_softness(car: CarSpecification) -> float:
+    """Return the rear axle's slip angle over the lateral acceleration of a steady turn, rad/(m/s^2)."""
+    return car.mass * car.front_axle_to_cg / (car.wheelbase * float(car.rear_cornering_stiffness or np.inf))
 
 
 def understeer_gradient(car: CarSpecification) -> float:

@@ -33,8 +33,8 @@ def follow(who: str, method: AbstractMethod, recording: Recording, *, smoothed: 
     """
     if smoothed and not isinstance(method, AbstractSmoothable):
         raise InputError(
-            f"{who}: smoothed: {type(method).__name__} looks back only. Leave smoothed out, or take a method that is a "
-            "kit.AbstractSmoothable."
+            f"{who}: smoothed: {type(method).__name__} looks back only. Leave smoothed out, or take the recommended "
+            "method or another kit.AbstractSmoothable."
         )
     there = [need for need in method.needs if not need.optional or need.channel in recording]
     check_needs(who, tuple(need._replace(optional=False) for need in there), recording)

@@ -133,7 +133,7 @@ def test_a_steer_that_is_off_makes_no_friction_known_on_a_dry_road():
     said = estimated("bank", drive)
     assert not np.asarray(said.known.friction).any()
     # The filter without the offset as a state is misled.
-    method = dataclasses.replace(friction.METHODS["bank"].make(CAR), steer_offset=jnp.asarray(1e-6))
+    method = dataclasses.replace(friction.METHODS["bank"].make(CAR), offset_spread=jnp.asarray(1e-6))
     units = {need.channel: need.unit for need in method.needs if need.channel in drive}
     misled = friction.estimate(method, Recording(T, {n: drive[n] for n in units}, units))
     assert np.min(misled["friction"]) < 0.7 < np.min(np.asarray(said["friction"])[T > 5.0])

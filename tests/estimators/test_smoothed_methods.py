@@ -101,8 +101,10 @@ def test_every_quantity_with_such_a_method_smooths_and_the_others_say_that_they_
         for quantity, module in QUANTITIES.items()
         if quantity != "sideslip" and "smoothed" in inspect.signature(module.estimate).parameters
     }
+    # The message names the recommended method.
+    assert {(quantity, QUANTITIES[quantity].RECOMMENDED) for quantity, _ in SMOOTHABLE} <= set(SMOOTHABLE)
     needs = made("bank", "tseng").needs
-    with pytest.raises(InputError, match="bank: smoothed: .* looks back only"):
+    with pytest.raises(InputError, match="bank: smoothed: .* looks back only.* the recommended"):
         estimators.bank.estimate(method_logs.CAR, method_logs.log(needs), method="tseng", smoothed=True)
 
 

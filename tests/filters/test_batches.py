@@ -8,7 +8,7 @@ import pytest
 from test_every_filter import FILTERS, MODELS, recordings
 
 from jaxveh import InputError, Result, filters
-from jaxveh.filters.smoothing import parallel
+from jaxveh.filters.smoothing.parallel import parallel_smoother
 from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
 from jaxveh.statespace import Info, Smoothing, kit
 from jaxveh.statespace.contract import who_lacks
@@ -139,7 +139,7 @@ def complete_rows(rows):
     return jax.tree.map(lambda leaf: jnp.where(jnp.isnan(leaf), 0.1, leaf), rows)
 
 
-FORMS = {"filtered": filters.scan, "smoothed": rauch_tung_striebel, "in parallel": parallel.smooth_rows}
+FORMS = {"filtered": filters.scan, "smoothed": rauch_tung_striebel, "in parallel": parallel_smoother}
 
 
 @pytest.mark.parametrize("missing", [False, True], ids=["complete", "one missing"])
@@ -193,7 +193,7 @@ def test_the_gradient_of_a_batch_in_parallel_is_that_of_its_runs():
     rows = complete_rows(rows)
 
     def total(noise, rows):
-        found = parallel.smooth_rows(
+        found = parallel_smoother(
             filters.Kalman(), eqx.tree_at(lambda m: m.measurement_noise.std.y0, model, noise), rows
         )
         return found.filtered.log_likelihood + jnp.sum(found.mean.x0)

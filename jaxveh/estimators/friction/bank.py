@@ -68,7 +68,8 @@ class FrictionBank(AbstractMethod):
     `frictions` (K,) of the filters and `prior` (K,), their probabilities without information; `jumps` (1/s): rate of jumps to any
     friction; `walk` (1/sqrt(s)): random walk of ln mu; `turn_time`, `force_time` (s): innovations of yaw rate and of a_y closer
     than this count as one; `stiffness_spread` (-) of an axle's slope, which changes within `stiffness_time` (s) and so absorbs
-    errors of the curve; `steer_noise` (rad), play included, and `steer_offset` (rad), the standard deviation of one that stays;
+    errors of the curve; `steer_noise` (rad), play included, and `offset_spread` (rad), the standard deviation of an
+    offset that stays;
     `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5): model errors;
     `a_y_noise` (m/s^2) and `force_noise` (-), a share of the measured a_y; `yaw_rate_noise` (rad/s).
 
@@ -89,7 +90,7 @@ class FrictionBank(AbstractMethod):
     stiffness_spread: jax.Array = positive("-", default=0.15)
     stiffness_time: jax.Array = positive("s", default=3.0)
     steer_noise: jax.Array = positive("rad", default=0.0007)
-    steer_offset: jax.Array = positive("rad", default=0.004)
+    offset_spread: jax.Array = positive("rad", default=0.004)
     v_y_noise: jax.Array = positive("m/s^1.5", default=0.15)
     yaw_noise: jax.Array = positive("rad/s^1.5", default=0.03)
     a_y_noise: jax.Array = positive("m/s^2", default=0.1)
@@ -134,7 +135,7 @@ class FrictionBank(AbstractMethod):
         spread = jnp.stack([
             0.5 + 0.0 * self.stiffness_spread, 0.1 + 0.0 * self.stiffness_spread, self.stiffness_spread,
             self.stiffness_spread, 0.15 + 0.0 * self.stiffness_spread, self.steer_noise, GRAVITY * self.car.roll_gradient,
-            self.steer_offset,
+            self.offset_spread,
         ])  # fmt: skip
         lean = GRAVITY * self.car.roll_gradient + zero
         return jnp.zeros((len(zero), STATES), zero.dtype).at[:, 6].set(lean), jnp.repeat(

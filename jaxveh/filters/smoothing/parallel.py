@@ -49,7 +49,7 @@ def smooth_parallel(
             f"smooth_parallel: {type(filter).__name__} with the angle(s) {', '.join(model.angles)}: innovations are "
             "wrapped, which is not a linear update. Use Iterated(Extended(), 2), or smooth."
         )
-    found = smooth_rows(filter, model, model.rows(recording))
+    found = parallel_smoother(filter, model, model.rows(recording))
     found = eqx.tree_at(lambda e: (e.time, e.filtered.time), found, (recording.time, recording.time))
     if throw:
         kit.raise_failure(found.filtered, filter, model, recording)
@@ -57,7 +57,7 @@ def smooth_parallel(
 
 
 @eqx.filter_jit
-def smooth_rows(filter, model, rows: Row) -> SmoothedEstimate:
+def parallel_smoother(filter, model, rows: Row) -> SmoothedEstimate:
     """The compiled part of `smooth_parallel`, over rows with (T,) leaves.
 
     In a batch of runs of a linear model with the same noises, of which no row is missing, the covariances are computed
