@@ -127,16 +127,16 @@ def test_a_jump_is_followed_within_a_second_where_there_is_excitation():
 
 
 def test_a_steer_that_is_off_makes_no_friction_known_on_a_dry_road():
-    """By a third of a degree at the road wheels, which the file does not say."""
+    """By 0.6 degrees at the road wheels, which the file does not say: no row looks slippery."""
     drive = lateral_drive(1.0, active(0.02))
-    drive = drive | {"steer": drive["steer"] + np.radians(0.4)}
+    drive = drive | {"steer": drive["steer"] + np.radians(0.6)}
     said = estimated("bank", drive)
     assert not np.asarray(said.known.friction).any()
     # The filter without the offset as a state is misled.
     method = dataclasses.replace(friction.METHODS["bank"].make(CAR), offset_spread=jnp.asarray(1e-6))
     units = {need.channel: need.unit for need in method.needs if need.channel in drive}
     misled = friction.estimate(method, Recording(T, {n: drive[n] for n in units}, units))
-    assert np.min(misled["friction"]) < 0.7 < np.min(np.asarray(said["friction"])[T > 5.0])
+    assert np.min(misled["friction"]) < 0.5 < 0.68 < np.min(said["friction"])
 
 
 @pytest.mark.parametrize("along", [True, False])
