@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
@@ -13,6 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.bijectors import Interval
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.two_axles import AbstractAxlePlaces
 from jaxveh.statespace import Continuous, Gaussian, Prior, StateDependent, StateSpace
 from jaxveh.vehicles import GRAVITY
 
@@ -70,7 +70,7 @@ class RearAxleReport(NamedTuple):
     reference_sideslip: Any
 
 
-class RearAxle(eqx.Module):
+class RearAxle(AbstractAxlePlaces):
     """A car reduced to the rear axle, for estimating sideslip; it needs neither steer nor any front axle parameter.
 
     - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m).
@@ -117,11 +117,6 @@ class RearAxle(eqx.Module):
     slip_noise: jax.Array = positive("rad s^0.5", default=0.001)
     bank_time: jax.Array = positive("s", default=15.0)
     slip_time: jax.Array = positive("s", default=2.0)
-
-    @property
-    def wheelbase(self) -> Any:
-        """Distance of the axles, m."""
-        return self.front_axle_to_cg + self.rear_axle_to_cg
 
     def shares(self, u) -> tuple[Any, Any]:
         """Lateral force over load of the front axle and of the rear axle, from the sensors: ISO 8855 signs."""

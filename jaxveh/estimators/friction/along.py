@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction.laws import LEAST_FRICTION, PlanarCar, SimilarCurve
-from jaxveh.estimators.friction.motion import LONGEST, LOWEST
+from jaxveh.estimators.two_axles import LONGEST, LOWEST
 
 CORNERS = ("fl", "fr", "rl", "rr")
 

@@ -9,8 +9,8 @@ import jax.numpy as jnp
 from jaxveh._core.names import record_type
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction.laws import PlanarCar
-from jaxveh.estimators.friction.motion import LOWEST
 from jaxveh.estimators.method import Filtered
+from jaxveh.estimators.two_axles import LOWEST
 from jaxveh.filters import Unscented
 from jaxveh.statespace import Continuous, Gaussian, Prior, StateSpace
 from jaxveh.vehicles import GRAVITY

@@ -14,9 +14,10 @@ from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction import brush_curve
 from jaxveh.estimators.friction.curve_follower import CurveBelief, CurveFollower
 from jaxveh.estimators.friction.laws import PlanarCar
-from jaxveh.estimators.friction.motion import LATERAL, Told, next_told, start_told
+from jaxveh.estimators.friction.motion import Told, next_told, start_told
 from jaxveh.estimators.friction.scalar import Follower, LogFriction
 from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.two_axles import LATERAL
 from jaxveh.vehicles import GRAVITY
 
 LEAST_FORCE = 0.15

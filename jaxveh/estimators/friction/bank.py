@@ -12,8 +12,9 @@ from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction.along import AlongEvidence
 from jaxveh.estimators.friction.laws import LEAST_FRICTION, PlanarCar
-from jaxveh.estimators.friction.motion import LATERAL, Told, next_told, start_told
+from jaxveh.estimators.friction.motion import Told, next_told, start_told
 from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.two_axles import LATERAL
 from jaxveh.vehicles import GRAVITY
 
 STATES = 8

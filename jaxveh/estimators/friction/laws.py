@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.two_axles import AbstractAxleForces
 from jaxveh.io import CarSpecification
 from jaxveh.tyres import kit as tyres
 from jaxveh.vehicles import GRAVITY
@@ -56,7 +57,7 @@ class SimilarCurve(eqx.Module):
         return force - slip * slope
 
 
-class PlanarCar(eqx.Module):
+class PlanarCar(AbstractAxleForces):
     """The car's parameters that the methods need, each a leaf; `planar_car` has defaults for those that a file may lack."""
 
     front: SimilarCurve
@@ -72,11 +73,6 @@ class PlanarCar(eqx.Module):
     roll_gradient: jax.Array = parameter("rad s^2/m", scale=0.005)
     steer_offset: jax.Array = parameter("rad", scale=0.003, default=0.0)
 
-    @property
-    def wheelbase(self):
-        """m."""
-        return self.front_axle_to_cg + self.rear_axle_to_cg
-
     def static_loads(self):
         """Loads of both axles, N."""
         weight = self.mass * GRAVITY / self.wheelbase
@@ -87,13 +83,6 @@ class PlanarCar(eqx.Module):
         moved = a_x * self.cg_height / GRAVITY
         least = lambda ratio: jnp.maximum(ratio, 0.1)
         return least(1.0 - moved / self.rear_axle_to_cg), least(1.0 + moved / self.front_axle_to_cg)
-
-    def axle_forces(self, a_y, yaw_acceleration):
-        """Lateral forces of both axles (N) from the inertial sensors, by equation 15 of the review for small steer."""
-        turn = self.yaw_inertia * yaw_acceleration
-        lateral = self.mass * a_y
-        front = (turn + self.rear_axle_to_cg * lateral) / self.wheelbase
-        return front, (self.front_axle_to_cg * lateral - turn) / self.wheelbase
 
     def slip_angles(self, steer, v_x, v_y, yaw_rate):
         """Slip angles of both axles, rad, with the measured `steer`; `v_x` (m/s) well above zero."""

@@ -6,19 +6,10 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from jaxveh.estimators.contract import Need
-
-LATERAL = (Need("v_x", "m/s"), Need("steer", "rad"), Need("yaw_rate", "rad/s"), Need("a_y", "m/s^2"))
-"""Speed, steer at the road wheels, yaw rate and lateral acceleration."""
-
-LOWEST = 5.0
-"""m/s: below this speed no lateral quantity is known."""
+from jaxveh.estimators.two_axles import LONGEST, LOWEST
 
 LAG = 0.025
 """s: delay of the inertial sensors against the steering angle sensor, their low-pass filter included."""
-
-LONGEST = 0.3
-"""s: a value that is older than this is no longer known."""
 
 
 class Told(NamedTuple):

@@ -12,6 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators.navigation.window import rotate
+from jaxveh.estimators.two_axles import AbstractAxlePlaces
 from jaxveh.vehicles import GRAVITY
 
 SLOWEST = 0.5
@@ -35,7 +36,7 @@ PLAIN = Parts()
 """Three axes and satellites only."""
 
 
-class Navigator(eqx.Module):
+class Navigator(AbstractAxlePlaces):
     """An inertial unit on a car with satellite navigation.
 
     - `lag` (s): delay of the satellites beyond that of the inertial unit; `sensor_lag` (s): delay of the inertial unit, its
@@ -100,11 +101,6 @@ class Navigator(eqx.Module):
 
     def __check_init__(self):
         check_parameters(self)
-
-    @property
-    def wheelbase(self) -> Any:
-        """Distance of the axles, m."""
-        return self.front_axle_to_cg + self.rear_axle_to_cg
 
     @property
     def lags(self) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.sideslip_methods.common import A_Y, STEER, V_X, YAW_RATE, Guarded, guard, sideslip_answer
+from jaxveh.estimators.two_axles import AbstractAxlePlaces
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -21,7 +22,7 @@ LEAST_STEADINESS = 0.2
 turn."""
 
 
-class AbstractSteadyState(AbstractMethod):
+class AbstractSteadyState(AbstractAxlePlaces, AbstractMethod):
     """The linear single track's parameters: `mass` (kg), distances of the axles (m), their cornering stiffnesses (N/rad)."""
 
     mass: jax.Array = positive("kg")
@@ -32,11 +33,6 @@ class AbstractSteadyState(AbstractMethod):
 
     def __check_init__(self):
         check_parameters(self)
-
-    @property
-    def wheelbase(self):
-        """Distance of the axles, m."""
-        return self.front_axle_to_cg + self.rear_axle_to_cg
 
     def first(self, t, values):
         return self.next((), t, values)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.two_axles import AbstractAxlePlaces
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -20,7 +20,7 @@ TYPICAL = {
 """Defaults for values that a car's file lacks: height, tracks and radius over the wheelbase, the drag over the mass (1/m)."""
 
 
-class SpeedCar(eqx.Module):
+class SpeedCar(AbstractAxlePlaces):
     """Mass (kg), lengths (m), cornering stiffnesses of the axles (N/rad) and shares (-) from a car's file."""
 
     mass: jax.Array = positive("kg")
@@ -38,11 +38,6 @@ class SpeedCar(eqx.Module):
     front_brake: jax.Array = parameter("-", scale=0.1)
     steering_ratio: jax.Array = positive("-")
     steer_offset: jax.Array = parameter("rad", scale=0.01)
-
-    @property
-    def wheelbase(self) -> Any:
-        """Distance of the axles, m."""
-        return self.front_axle_to_cg + self.rear_axle_to_cg
 
     @property
     def cornering_stiffnesses(self) -> tuple[Any, Any]:

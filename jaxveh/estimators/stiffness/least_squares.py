@@ -9,7 +9,8 @@ import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.method import AbstractMethod, answer
-from jaxveh.estimators.stiffness.single_track import LATERAL, LEAN, Followed, LinearCar, Signals
+from jaxveh.estimators.stiffness.single_track import LEAN, Followed, LinearCar, Signals
+from jaxveh.estimators.two_axles import LATERAL
 
 
 class ForcesMemory(NamedTuple):

@@ -10,23 +10,14 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.contract import Need
+from jaxveh.estimators.two_axles import LATERAL, LONGEST, LOWEST, AbstractAxleForces
 from jaxveh.io import CarSpecification
-
-LATERAL = (Need("v_x", "m/s"), Need("steer", "rad"), Need("yaw_rate", "rad/s"), Need("a_y", "m/s^2"))
-"""Speed, steer at the road wheels, yaw rate and lateral acceleration."""
-
-LOWEST = 5.0
-"""m/s: below this speed nothing is known."""
-
-LONGEST = 0.3
-"""s: a value that is older than this is no longer known."""
 
 LEAN = 0.059
 """Relative increase of the measured lateral acceleration because the body leans, for an ordinary car."""
 
 
-class LinearCar(eqx.Module):
+class LinearCar(AbstractAxleForces):
     """The parameters of a linear single track; the methods start from its stiffnesses (N/rad, of the axles)."""
 
     mass: jax.Array = positive("kg")
@@ -36,18 +27,6 @@ class LinearCar(eqx.Module):
     front_cornering_stiffness: jax.Array = positive("N/rad")
     rear_cornering_stiffness: jax.Array = positive("N/rad")
     steer_offset: jax.Array = parameter("rad", scale=0.002, default=0.0)
-
-    @property
-    def wheelbase(self):
-        """m."""
-        return self.front_axle_to_cg + self.rear_axle_to_cg
-
-    def axle_forces(self, a_y, yaw_acceleration):
-        """Lateral forces of both axles, N: equation 15 at small angles (F_yr has no cosine of the steer: erratum)."""
-        turn = self.yaw_inertia * yaw_acceleration
-        lateral = self.mass * a_y
-        front = (turn + self.rear_axle_to_cg * lateral) / self.wheelbase
-        return front, (self.front_axle_to_cg * lateral - turn) / self.wheelbase
 
 
 def linear_car(car: CarSpecification) -> LinearCar:

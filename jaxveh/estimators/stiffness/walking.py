@@ -12,7 +12,8 @@ from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractSmoothable, answer
 from jaxveh.estimators.sequential import Belief, innovation, update
-from jaxveh.estimators.stiffness.single_track import LATERAL, LEAN, LOWEST, Followed, LinearCar, Signals
+from jaxveh.estimators.stiffness.single_track import LEAN, Followed, LinearCar, Signals
+from jaxveh.estimators.two_axles import LATERAL, LOWEST
 
 STATES = 10
 """Number of states: v_y (m/s), yaw rate (rad/s), ln of both stiffnesses over the file's, offsets of steer (rad), a_y (m/s^2) and
