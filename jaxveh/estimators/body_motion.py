@@ -3,6 +3,7 @@ grade and mass are estimated."""
 
 from __future__ import annotations
 
+import abc
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -14,6 +15,7 @@ from jaxveh._core.errors import InputError
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning
+from jaxveh.estimators.method import AbstractMethod, Answer
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY, regularised_speed
 
@@ -37,6 +39,11 @@ def number_of(car: CarSpecification, key: str, who: str, unit: str) -> float:
     if value is None:
         raise InputError(f"{who}: the car's file has no {key} ({unit}); give it.")
     return value
+
+
+def numbers_in(car: CarSpecification, *keys: str) -> dict[str, float]:
+    """The numbers of a car's file by key, without those that the file does not have."""
+    return {key: value for key in keys if (value := getattr(car, key)) is not None}
 
 
 def hold(value: Any, last: Any) -> Any:
@@ -173,6 +180,28 @@ class BodyMotion(AbstractCleaning):
             "pull_silence": jnp.maximum(memory.pull_silence, memory.speed_silence),
         }
         return memory, values | made
+
+
+class AbstractMotionMethod(AbstractMethod):
+    """A method on rows that `motion` completes; its memory has the motion's in a field `motion`."""
+
+    motion: BodyMotion
+
+    @abc.abstractmethod
+    def begin(self, motion: MotionMemory, heard: dict[str, Any]) -> Any:
+        """The memory before the first row, with the motion after it and the values of the completed row."""
+
+    @abc.abstractmethod
+    def follow(self, motion: MotionMemory, heard: dict[str, Any], memory: Any) -> tuple[Any, Answer]:
+        """The memory after a row, and the answer to it."""
+
+    def first(self, t, values):
+        motion, heard = self.motion.first(t, values)
+        return self.follow(motion, heard, self.begin(motion, heard))
+
+    def next(self, memory, t, values):
+        motion, heard = self.motion.next(memory.motion, t, values)
+        return self.follow(motion, heard, memory)
 
 
 def away_from_zero(v_x: Any) -> Any:

@@ -58,6 +58,6 @@ def lateral_of(car: CarSpecification, who: str) -> Lateral:
     )
 
 
-def motion_of(car: CarSpecification) -> BodyMotion:
+def motion_of(car: CarSpecification, *, wheels_first: bool = False) -> BodyMotion:
     """The cleaning that completes rows, with the car's share of driving torque."""
-    return BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive)
+    return BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive, wheels_first=wheels_first)

@@ -11,8 +11,9 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
-from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_from_zero, number_of
+from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_from_zero, number_of, numbers_in
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractSmoothable, answer
 from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
 from jaxveh.estimators.steer_agreement import AgreementMemory, SteerAgreement, agreement_of
@@ -240,12 +241,11 @@ def leaning_filter(car: CarSpecification, who: str, **options: Any) -> Leaning:
     """The filter for a car's file. **Raises** `InputError` for a file without `roll_gradient`, which separates roll from
     bank."""
     stiffness = number_of(car, "rear_cornering_stiffness", who, "N/rad")
-    told = {name: getattr(car, name) for name in ("roll_frequency", "roll_damping")}
     return Leaning(
-        BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive),
+        motion_of(car),
         rear_axle_to_cg=car.rear_axle_to_cg,
         rear_compliance=car.mass * car.front_axle_to_cg / (car.wheelbase * stiffness),
         roll_gradient=number_of(car, "roll_gradient", who, "rad/(m/s^2)"),
-        **{name: value for name, value in told.items() if value is not None},
+        **numbers_in(car, "roll_frequency", "roll_damping"),
         **{"steering": agreement_of(car, who), **options},
     )

@@ -12,6 +12,7 @@ from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.names import record_type
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
+from jaxveh.estimators.body_motion import numbers_in
 from jaxveh.estimators.contract import Calibration, Need, check_needs, model_of, spans_of, start_of
 from jaxveh.estimators.live import AsItIs, Live
 from jaxveh.filters import AbstractFilter, Estimate, Unscented, run
@@ -52,8 +53,7 @@ def car_of(car: CarSpecification | Longitudinal) -> Longitudinal:
         raise InputError(
             "mass_and_grade: the car's file has no wheel_radius (m), which converts a torque into a force; give it."
         )
-    told = {name: getattr(car, name) for name in ("wheel_inertia", "drag", "rolling_resistance")}
-    known = {name: value for name, value in told.items() if value is not None}
+    known = numbers_in(car, "wheel_inertia", "drag", "rolling_resistance")
     return Longitudinal(car.mass, wheel_radius=car.wheel_radius, **known)
 
 

@@ -13,8 +13,18 @@ from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators import mass_and_grade
-from jaxveh.estimators.body_motion import SILENCE, SPEEDS, BodyMotion, away_from_zero, driven_share, hold, number_of
+from jaxveh.estimators.body_motion import (
+    SILENCE,
+    SPEEDS,
+    BodyMotion,
+    away_from_zero,
+    driven_share,
+    hold,
+    number_of,
+    numbers_in,
+)
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractSmoothable, Filtered, answer
 from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
@@ -260,17 +270,16 @@ class Pulling(AbstractSmoothable):
 def pulling_filter(car: CarSpecification, who: str, **options: Any) -> Pulling:
     """The filter for a car's file. **Raises** `InputError` for a file without `wheel_radius`, which converts a torque into a
     force."""
-    told = {name: getattr(car, name) for name in ("wheel_inertia", "drag", "rolling_resistance", "pitch_gradient")}
     stiffness = car.rear_cornering_stiffness
     compliance = 0.0 if stiffness is None else car.mass * car.front_axle_to_cg / (car.wheelbase * stiffness)
     return Pulling(
-        BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive, wheels_first=True),
+        motion_of(car, wheels_first=True),
         mass=car.mass,
         wheel_radius=number_of(car, "wheel_radius", who, "m"),
         rear_axle_to_cg=car.rear_axle_to_cg,
         wheelbase=car.wheelbase,
         rear_compliance=compliance,
-        **{name: value for name, value in told.items() if value is not None},
+        **numbers_in(car, "wheel_inertia", "drag", "rolling_resistance", "pitch_gradient"),
         **options,
     )
 
@@ -319,9 +328,7 @@ def joint_filter(car: CarSpecification, shown: tuple[str, ...]) -> Filtered:
     where the pedals move too seldom to determine the mass, as the model's docstring explains, both are large.
     """
     model = mass_and_grade.model(car, v_x=0.1, a_x=0.5, a_x_bias=0.06, mass_spread=0.15, grade_rate_walk=0.02)
-    cleaning = Held(
-        BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive), car.pitch_gradient or 0.0
-    )
+    cleaning = Held(motion_of(car), car.pitch_gradient or 0.0)
     return Filtered(model, Extended(), JOINT, cleaning, _joint_told, shown)
 
 

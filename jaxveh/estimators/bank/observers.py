@@ -8,9 +8,9 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
-from jaxveh.estimators.body_motion import CRAWL, LATERAL, SILENCE, BodyMotion, arcsin_of
+from jaxveh.estimators.body_motion import CRAWL, LATERAL, SILENCE, AbstractMotionMethod, arcsin_of
 from jaxveh.estimators.lateral import Lateral, lateral_of, motion_of
-from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.method import answer
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -28,7 +28,7 @@ class DisturbanceMemory(NamedTuple):
     age: Any
 
 
-class DisturbanceObserver(AbstractMethod):
+class DisturbanceObserver(AbstractMotionMethod):
     """A disturbance observer (J. Hahn, R. Rajamani, S. You 2002): the model's lateral acceleration against the measured one.
 
         g bank = Q (f_y - v_x r - d v_y/dt),    f_y = a_y / (1 + g roll_gradient)
@@ -38,7 +38,6 @@ class DisturbanceObserver(AbstractMethod):
     the tyres, needs the forces of all four wheels and is left out. An accelerometer offset of 0.1 m/s^2 appears as 0.58 degrees.
     """
 
-    motion: BodyMotion
     car: Lateral
     time: jax.Array = positive("s", default=0.6)
 
@@ -46,26 +45,21 @@ class DisturbanceObserver(AbstractMethod):
     def needs(self):
         return LATERAL
 
-    def first(self, t, values):
-        motion, heard = self.motion.first(t, values)
-        v_y = self._rear(heard)
-        return self._next(motion, heard, jnp.zeros_like(t), v_y, jnp.zeros_like(t))
-
-    def next(self, memory, t, values):
-        motion, heard = self.motion.next(memory.motion, t, values)
-        return self._next(motion, heard, memory.push, memory.slow_v_y, memory.age)
+    def begin(self, motion, heard):
+        zero = jnp.zeros_like(motion.t)
+        return DisturbanceMemory(motion, zero, self._rear(heard), zero)
 
     def _rear(self, heard):
         return self.car.rear_speed(heard["v_x"], heard["yaw_rate"], self.car.plane_force(heard["a_y"]))
 
-    def _next(self, motion, heard, push, slow_v_y, age):
+    def follow(self, motion, heard, memory):
         share = heard["dt"] / (self.time + heard["dt"])
         v_y = self._rear(heard)
-        slow_v_y = slow_v_y + share * (v_y - slow_v_y)
+        slow_v_y = memory.slow_v_y + share * (v_y - memory.slow_v_y)
         plane = self.car.plane_force(heard["a_y"]) - heard["v_x"] * heard["yaw_rate"]
-        push = push + share * (plane - push)
+        push = memory.push + share * (plane - memory.push)
         there = heard["silence"] < SILENCE
-        age = jnp.where(there, age + heard["dt"], 0.0)
+        age = jnp.where(there, memory.age + heard["dt"], 0.0)
         known = there & (age > SETTLED * self.time)
         bank = arcsin_of(push - (v_y - slow_v_y) / self.time)
         return DisturbanceMemory(motion, push, slow_v_y, age), answer({"bank": bank}, known=known)
@@ -81,7 +75,7 @@ class IntegralMemory(NamedTuple):
     age: Any
 
 
-class UnknownInput(AbstractMethod):
+class UnknownInput(AbstractMotionMethod):
     """An unknown-input proportional-integral observer (C. Sentouh, Y. Sebsadji, S. Mammar, S. Glaser 2007):
 
         d v_y = f_y - v_x r - push + 2 w e,    d push = -w^2 e,    e = v_y,rear - v_y,    bank = arcsin(push / g)
@@ -90,7 +84,6 @@ class UnknownInput(AbstractMethod):
     the lateral velocity of a rear axle with its share of the lateral force, which needs no steer.
     """
 
-    motion: BodyMotion
     car: Lateral
     bandwidth: jax.Array = positive("1/s", default=2.5)
 
@@ -98,27 +91,21 @@ class UnknownInput(AbstractMethod):
     def needs(self):
         return LATERAL
 
-    def first(self, t, values):
-        motion, heard = self.motion.first(t, values)
-        zero = jnp.zeros_like(t)
-        return self._next(motion, heard, zero, zero, zero)
+    def begin(self, motion, heard):
+        return IntegralMemory(motion, *[jnp.zeros_like(motion.t)] * 3)
 
-    def next(self, memory, t, values):
-        motion, heard = self.motion.next(memory.motion, t, values)
-        return self._next(motion, heard, memory.v_y, memory.push, memory.age)
-
-    def _next(self, motion, heard, v_y, push, age):
+    def follow(self, motion, heard, memory):
         dt, w, v_x, turn = heard["dt"], self.bandwidth, heard["v_x"], heard["yaw_rate"]
         f_y = self.car.plane_force(heard["a_y"])
-        ahead = v_y + dt * (f_y - v_x * turn - push)
+        ahead = memory.v_y + dt * (f_y - v_x * turn - memory.push)
         # Exact poles of a step, so that a long step cannot oscillate.
         fade = jnp.exp(-w * dt)
         error = self.car.rear_speed(v_x, turn, f_y) - ahead
         v_y = ahead + (1.0 - fade * fade) * error
-        push = push - jnp.where(dt > 0, jnp.square(1.0 - fade) / jnp.where(dt > 0, dt, 1.0), 0.0) * error
+        push = memory.push - jnp.where(dt > 0, jnp.square(1.0 - fade) / jnp.where(dt > 0, dt, 1.0), 0.0) * error
         push = jnp.clip(push, -0.5 * GRAVITY, 0.5 * GRAVITY)
         there = heard["silence"] < SILENCE
-        age = jnp.where(there, age + dt, 0.0)
+        age = jnp.where(there, memory.age + dt, 0.0)
         known = there & (age * w > 2.0 * SETTLED) & (jnp.abs(v_x) > CRAWL)
         said = answer({"bank": arcsin_of(push), "v_y": v_y}, known=known)
         return IntegralMemory(motion, v_y, push, age), said

@@ -12,14 +12,14 @@ from jaxveh.estimators.body_motion import (
     CRAWL,
     LATERAL,
     SILENCE,
-    BodyMotion,
+    AbstractMotionMethod,
     arcsin_of,
     hold,
     number_of,
 )
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import Lateral, lateral_of, motion_of
-from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.method import answer
 from jaxveh.io import CarSpecification
 
 STEERING = Need("steering_wheel", "rad")
@@ -37,7 +37,7 @@ class TsengMemory(NamedTuple):
     age: Any
 
 
-class Tseng(AbstractMethod):
+class Tseng(AbstractMotionMethod):
     """The bank of H. E. Tseng (Vehicle System Dynamics 36, 2001): `bank = static max(0, 1 - |DFC| - |d static / dt|)`.
 
     `static = arcsin((f_y - v_x r) / g)`. The dynamics factor DFC is the deviation of acceleration, yaw rate and steer from a
@@ -45,7 +45,6 @@ class Tseng(AbstractMethod):
     `doubt_rate` (rad/s). All signals have a low-pass filter of `time` (s). `ratio` (-) is the steering ratio.
     """
 
-    motion: BodyMotion
     car: Lateral
     ratio: jax.Array = positive("-")
     time: jax.Array = positive("s", default=0.5)
@@ -56,15 +55,10 @@ class Tseng(AbstractMethod):
     def needs(self):
         return (*LATERAL, STEERING)
 
-    def first(self, t, values):
-        motion, heard = self.motion.first(t, values)
-        return self._next(motion, heard, TsengMemory(motion, *[jnp.zeros_like(t)] * 4))
+    def begin(self, motion, heard):
+        return TsengMemory(motion, *[jnp.zeros_like(motion.t)] * 4)
 
-    def next(self, memory, t, values):
-        motion, heard = self.motion.next(memory.motion, t, values)
-        return self._next(motion, heard, memory)
-
-    def _next(self, motion, heard, memory):
+    def follow(self, motion, heard, memory):
         dt, v_x, turn = heard["dt"], heard["v_x"], heard["yaw_rate"]
         wheel = hold(heard["steering_wheel"], memory.wheel)
         f_y = self.car.plane_force(heard["a_y"])

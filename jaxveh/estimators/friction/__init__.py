@@ -14,6 +14,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
+from jaxveh.estimators.body_motion import number_of
 from jaxveh.estimators.following import follow
 from jaxveh.estimators.friction.along import AlongEvidence, WheelForces
 from jaxveh.estimators.friction.augmented import augmented_filter
@@ -64,9 +65,8 @@ def _lateral(car: CarSpecification) -> LateralCurve:
 
 
 def _aligning(car: CarSpecification) -> AligningTorque:
-    if car.steering_ratio is None:
-        raise InputError("friction: aligning_torque: the car's file has no steering_ratio (-); give it.")
-    return AligningTorque(Axles(planar_car(car)), Follower(), car.steering_ratio)
+    ratio = number_of(car, "steering_ratio", "friction: aligning_torque", "-")
+    return AligningTorque(Axles(planar_car(car)), Follower(), ratio)
 
 
 def _lugre(car: CarSpecification) -> WheelObserver:

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.body_motion import SILENCE, BodyMotion, arcsin_of, hold
+from jaxveh.estimators.body_motion import SILENCE, AbstractMotionMethod, arcsin_of, hold
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractMethod, answer
@@ -28,11 +28,10 @@ class KinematicMemory(NamedTuple):
     age: Any
 
 
-class Kinematic(AbstractMethod):
+class Kinematic(AbstractMotionMethod):
     """`grade = arcsin((a_x / (1 + g P) - d v_x/dt + v_y r) / g)`, P = `pitch_gradient` (rad/(m/s^2)), with the low-pass filter of
     the motion (`slope_time`). For `v_y` only the kinematic part `rear_axle_to_cg r` is used, without slip of the rear axle."""
 
-    motion: BodyMotion
     rear_axle_to_cg: jax.Array = positive("m")
     pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005)
 
@@ -40,17 +39,12 @@ class Kinematic(AbstractMethod):
     def needs(self):
         return ALONG
 
-    def first(self, t, values):
-        motion, heard = self.motion.first(t, values)
-        return self._next(motion, heard, jnp.zeros_like(t))
+    def begin(self, motion, heard):
+        return KinematicMemory(motion, jnp.zeros_like(motion.t))
 
-    def next(self, memory, t, values):
-        motion, heard = self.motion.next(memory.motion, t, values)
-        return self._next(motion, heard, memory.age)
-
-    def _next(self, motion, heard, age):
+    def follow(self, motion, heard, memory):
         there = heard["pull_silence"] < SILENCE
-        age = jnp.where(there, age + heard["dt"], 0.0)
+        age = jnp.where(there, memory.age + heard["dt"], 0.0)
         felt = heard["slow_a_x"] / (1.0 + GRAVITY * self.pitch_gradient)
         turning = self.rear_axle_to_cg * jnp.square(heard["late_yaw_rate"])
         grade = arcsin_of(felt - heard["v_x_rate"] + turning)
@@ -74,12 +68,11 @@ class SatelliteMemory(NamedTuple):
     age: Any
 
 
-class Satellite(AbstractMethod):
+class Satellite(AbstractMotionMethod):
     """`grade = arcsin((a_x / (1 + g P) - d speed/dt) / g)` with the satellites' speed, which contains no wheel slip (P. Sahlholm,
     K. Johansson 2008). Both have a low-pass filter of `time` (s), the acceleration also one of the satellites' `delay` (s). In
     bends the speed over ground differs slightly from v_x."""
 
-    motion: BodyMotion
     pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005)
     time: jax.Array = positive("s", default=1.0)
     delay: jax.Array = positive("s", default=0.15)
@@ -88,16 +81,10 @@ class Satellite(AbstractMethod):
     def needs(self):
         return (*ALONG, Need("speed", "m/s"))
 
-    def first(self, t, values):
-        motion, heard = self.motion.first(t, values)
-        zero = jnp.zeros_like(t)
-        return self._next(motion, heard, SatelliteMemory(motion, zero, zero, zero, zero, zero, zero, zero, zero))
+    def begin(self, motion, heard):
+        return SatelliteMemory(motion, *[jnp.zeros_like(motion.t)] * 8)
 
-    def next(self, memory, t, values):
-        motion, heard = self.motion.next(memory.motion, t, values)
-        return self._next(motion, heard, memory)
-
-    def _next(self, motion, heard, memory):
+    def follow(self, motion, heard, memory):
         dt, spoke = heard["dt"], ~jnp.isnan(heard["speed"])
         since = memory.since + dt
         speed = hold(heard["speed"], memory.speed)

@@ -14,7 +14,7 @@ import numpy as np
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.following import follow
 from jaxveh.estimators.mass.forgetting import forgetting_factors
-from jaxveh.estimators.mass.ratios import gated_ratios, high_pass_of, kinematic_of
+from jaxveh.estimators.mass.ratios import Gated, HighPass, KinematicGrade, ratio_of
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
 from jaxveh.estimators.pulling import joint_filter, pulling_filter
 from jaxveh.io import CarSpecification
@@ -25,12 +25,12 @@ SHOWN = {"mass": "kg"}
 
 METHODS = {
     "gated": MethodOfCar(
-        lambda car: gated_ratios(car, NAME),
+        lambda car: ratio_of(Gated, car, NAME),
         "least squares of force over acceleration, known only after some seconds above 0.6 m/s^2",
         "paper 004 [8]",
     ),
     "high_pass": MethodOfCar(
-        lambda car: high_pass_of(car, NAME),
+        lambda car: ratio_of(HighPass, car, NAME),
         "least squares of the fast parts of force and of the speed's rate, because grades are slow; known only where "
         "pedals have moved much",
         "paper 004 [11]",
@@ -41,7 +41,7 @@ METHODS = {
         "paper 004 [13], 3.1.2.3 [127]",
     ),
     "kinematic_grade": MethodOfCar(
-        lambda car: kinematic_of(car, NAME),
+        lambda car: ratio_of(KinematicGrade, car, NAME),
         "the grade from accelerometer and speed, then least squares; known only after some seconds of acceleration",
         "paper 004 [12]",
     ),

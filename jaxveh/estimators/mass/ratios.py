@@ -11,9 +11,9 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.body_motion import SILENCE, BodyMotion, hold, number_of
+from jaxveh.estimators.body_motion import SILENCE, AbstractMotionMethod, hold, number_of, numbers_in
 from jaxveh.estimators.lateral import motion_of
-from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.method import answer
 from jaxveh.estimators.pulling import JOINT, SLOWEST, WIDEST_MASS
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
@@ -51,17 +51,16 @@ class RatioMemory(NamedTuple):
     age: Any
 
 
-class AbstractRatio(AbstractMethod):
+class AbstractRatio(AbstractMotionMethod):
     """`mass = sum(a F) / sum(a^2)`, with sums over time that start from the file's `mass` (kg) with the relative standard
     deviation `prior_spread` (-), and forget with the time constant `memory` (s). The standard deviation is that of residuals with
     the correlation time `lasting` (s)."""
 
-    motion: eqx.AbstractVar[BodyMotion]
-    pull: eqx.AbstractVar[Pull]
-    mass: eqx.AbstractVar[jax.Array]
-    memory: eqx.AbstractVar[jax.Array]
-    lasting: eqx.AbstractVar[jax.Array]
-    prior_spread: eqx.AbstractVar[jax.Array]
+    pull: Pull
+    mass: jax.Array = positive("kg")
+    memory: jax.Array = positive("s", default=300.0)
+    lasting: jax.Array = positive("s", default=1.2)
+    prior_spread: jax.Array = positive("-", default=0.3)
 
     @abc.abstractmethod
     def pair(self, heard: Any, force: Any, memory: RatioMemory) -> tuple[Any, Any, Any]:
@@ -71,26 +70,20 @@ class AbstractRatio(AbstractMethod):
     def needs(self):
         return JOINT
 
-    def first(self, t, values):
-        motion, heard = self.motion.first(t, values)
-        zero = jnp.zeros_like(t)
+    def begin(self, motion, heard):
+        zero = jnp.zeros_like(motion.t)
         # The prior is equivalent to an earlier measurement with this sum of squares.
         start = jnp.square(RESIDUAL / self.prior_spread) * 2.0 * self.lasting + zero
-        memory = RatioMemory(motion, zero, zero, zero, zero, zero, start, start * self.mass, zero, zero)
-        return self._next(motion, heard, memory, values)
+        return RatioMemory(motion, zero, zero, zero, zero, zero, start, start * self.mass, zero, zero)
 
-    def next(self, memory, t, values):
-        motion, heard = self.motion.next(memory.motion, t, values)
-        return self._next(motion, heard, memory, values)
-
-    def _next(self, motion, heard, memory, values):
+    def follow(self, motion, heard, memory):
         dt = heard["dt"]
-        drive, brake = hold(values["drive_torque"], memory.drive), hold(values["brake_torque"], memory.brake)
+        drive, brake = hold(heard["drive_torque"], memory.drive), hold(heard["brake_torque"], memory.brake)
         raw = self.pull.force(drive, brake, heard)
         # The speed's rate has the same low-pass filter.
         force = memory.force + dt / (self.motion.slope_time + dt) * (raw - memory.force)
         rate, push, counts = self.pair(heard, force, memory)
-        spoke = ~(jnp.isnan(values["drive_torque"]) | jnp.isnan(values["brake_torque"]))
+        spoke = ~(jnp.isnan(heard["drive_torque"]) | jnp.isnan(heard["brake_torque"]))
         there = spoke & (heard["pull_silence"] < SILENCE) & (heard["v_x"] > SLOWEST)
         weight = jnp.where(there & (memory.age > START), counts * dt, 0.0)
         keep = jnp.exp(-weight / self.memory)
@@ -138,13 +131,7 @@ class Gated(AbstractRatio):
     """The force against the accelerometer where it measures more than `gate` (m/s^2) (P. Karoshi et al. 2018, ref. [8] of paper
     004)."""
 
-    motion: BodyMotion
-    pull: Pull
-    mass: jax.Array = positive("kg")
     gate: jax.Array = positive("m/s^2", default=0.6)
-    memory: jax.Array = positive("s", default=300.0)
-    lasting: jax.Array = positive("s", default=1.2)
-    prior_spread: jax.Array = positive("-", default=0.3)
 
     def pair(self, heard, force, memory):
         felt = heard["slow_a_x"] / (1.0 + GRAVITY * self.pull.pitch_gradient)
@@ -153,13 +140,6 @@ class Gated(AbstractRatio):
 
 class KinematicGrade(AbstractRatio):
     """The grade from accelerometer and speed, then `F = m (d v_x/dt + g sin(grade) + g f_r)` (ref. [12] of paper 004)."""
-
-    motion: BodyMotion
-    pull: Pull
-    mass: jax.Array = positive("kg")
-    memory: jax.Array = positive("s", default=300.0)
-    lasting: jax.Array = positive("s", default=1.2)
-    prior_spread: jax.Array = positive("-", default=0.3)
 
     def pair(self, heard, force, memory):
         pitch = self.pull.pitch_gradient
@@ -171,12 +151,7 @@ class KinematicGrade(AbstractRatio):
 class HighPass(AbstractRatio):
     """Changes of the force faster than `SLOW` against those of the speed's rate (ref. [11] of paper 004): grades are slower."""
 
-    motion: BodyMotion
-    pull: Pull
-    mass: jax.Array = positive("kg")
-    memory: jax.Array = positive("s", default=300.0)
     lasting: jax.Array = positive("s", default=1.0)
-    prior_spread: jax.Array = positive("-", default=0.3)
 
     def pair(self, heard, force, memory):
         rate = heard["v_x_rate"] - memory.slow_rate
@@ -185,21 +160,10 @@ class HighPass(AbstractRatio):
 
 def pull_of(car: CarSpecification, who: str) -> Pull:
     """Makes `Pull` from a car's file. **Raises** `InputError` for a file without `wheel_radius`."""
-    told = {name: getattr(car, name) for name in ("wheel_inertia", "drag", "rolling_resistance", "pitch_gradient")}
-    known = {name: value for name, value in told.items() if value is not None}
+    known = numbers_in(car, "wheel_inertia", "drag", "rolling_resistance", "pitch_gradient")
     return Pull(number_of(car, "wheel_radius", who, "m"), **known)
 
 
-def gated_ratios(car: CarSpecification, who: str) -> Gated:
-    """Makes `Gated` from a car's file."""
-    return Gated(motion_of(car), pull_of(car, who), car.mass)
-
-
-def kinematic_of(car: CarSpecification, who: str) -> KinematicGrade:
-    """Makes `KinematicGrade` from a car's file."""
-    return KinematicGrade(motion_of(car), pull_of(car, who), car.mass)
-
-
-def high_pass_of(car: CarSpecification, who: str) -> HighPass:
-    """Makes `HighPass` from a car's file."""
-    return HighPass(motion_of(car), pull_of(car, who), car.mass)
+def ratio_of(kind: type[AbstractRatio], car: CarSpecification, who: str) -> AbstractRatio:
+    """Makes a method of this `kind` from a car's file."""
+    return kind(motion_of(car), pull_of(car, who), car.mass)

@@ -8,10 +8,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
-from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, arcsin_of, hold
+from jaxveh.estimators.body_motion import LATERAL, SILENCE, AbstractMotionMethod, arcsin_of, hold
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
-from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.method import answer
 from jaxveh.io import CarSpecification
 
 ROLL_RATE = Need("roll_rate", "rad/s")
@@ -29,7 +29,7 @@ class GyroMemory(NamedTuple):
     age: Any
 
 
-class Gyro(AbstractMethod):
+class Gyro(AbstractMotionMethod):
     """A complementary filter (A. Hac, D. Nichols, D. Sygnarowicz 2010: roll first, then the lateral speed):
 
         d roll = roll_rate + r slope - offset + e / time,   d offset = -e / (4 time^2),   e = arcsin((a_y - v_x r) / g) - roll
@@ -39,23 +39,17 @@ class Gyro(AbstractMethod):
     between slow and fast.
     """
 
-    motion: BodyMotion
     time: jax.Array = positive("s", default=4.0)
 
     @property
     def needs(self):
         return (*LATERAL, ROLL_RATE)
 
-    def first(self, t, values):
-        motion, heard = self.motion.first(t, values)
-        zero = jnp.zeros_like(t)
-        return self._next(motion, heard, GyroMemory(motion, zero, zero + SILENCE, zero, zero, zero))
+    def begin(self, motion, heard):
+        zero = jnp.zeros_like(motion.t)
+        return GyroMemory(motion, zero, zero + SILENCE, zero, zero, zero)
 
-    def next(self, memory, t, values):
-        motion, heard = self.motion.next(memory.motion, t, values)
-        return self._next(motion, heard, memory)
-
-    def _next(self, motion, heard, memory):
+    def follow(self, motion, heard, memory):
         dt = heard["dt"]
         rate = hold(heard["roll_rate"], memory.rate)
         silence = jnp.where(jnp.isnan(heard["roll_rate"]), memory.silence + dt, 0.0)

@@ -10,10 +10,10 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import positive
-from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, hold
+from jaxveh.estimators.body_motion import LATERAL, SILENCE, AbstractMotionMethod, hold
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
-from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.method import answer
 from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
@@ -37,7 +37,7 @@ class SixAxisMemory(NamedTuple):
     belief: Belief
 
 
-class SixAxis(AbstractMethod):
+class SixAxis(AbstractMotionMethod):
     """The kinematic Kalman filter of W. Klier, A. Reim, D. Stapel (SAE 2008-01-0582), for a car that stays on the road (v_z = 0):
 
         d v_x = a_x + v_y r + g sin(pitch),                   d v_y = a_y - v_x r - g sin(roll) cos(pitch)
@@ -51,7 +51,6 @@ class SixAxis(AbstractMethod):
     of the wheels' speed.
     """
 
-    motion: BodyMotion
     a_noise: jax.Array = positive("m/s/sqrt(s)", default=0.05)
     gyro_noise: jax.Array = positive("rad/sqrt(s)", default=0.004)
     v_noise: jax.Array = positive("m/s", default=0.2)
@@ -62,18 +61,13 @@ class SixAxis(AbstractMethod):
     def needs(self):
         return SIX
 
-    def first(self, t, values):
-        motion, heard = self.motion.first(t, values)
+    def begin(self, motion, heard):
         stds = {"v_x": 1.0, "v_y": 0.3, "roll": 0.1, "pitch": 0.1}
-        belief = belief_of(State, {"v_x": heard["v_x"]}, stds, t)
-        zero = jnp.zeros_like(t)
-        return self._next(motion, heard, SixAxisMemory(motion, zero, zero, zero + SILENCE, belief))
+        belief = belief_of(State, {"v_x": heard["v_x"]}, stds, motion.t)
+        zero = jnp.zeros_like(motion.t)
+        return SixAxisMemory(motion, zero, zero, zero + SILENCE, belief)
 
-    def next(self, memory, t, values):
-        motion, heard = self.motion.next(memory.motion, t, values)
-        return self._next(motion, heard, memory)
-
-    def _next(self, motion, heard, memory):
+    def follow(self, motion, heard, memory):
         dt, r = heard["dt"], heard["yaw_rate"]
         p, q = hold(heard["roll_rate"], memory.roll_rate), hold(heard["pitch_rate"], memory.pitch_rate)
         spoke = ~(jnp.isnan(heard["roll_rate"]) | jnp.isnan(heard["pitch_rate"]))

@@ -7,8 +7,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
 from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.body_motion import number_of
 from jaxveh.estimators.two_axles import AbstractAxlePlaces
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
@@ -82,10 +82,7 @@ FORCE_KEYS = {
 
 def keys_of(car: CarSpecification, who: str, keys: dict[str, str]) -> dict[str, float]:
     """Values of the car's file by key. **Raises** `InputError` for a missing one, with its key and unit."""
-    for name, unit in keys.items():
-        if getattr(car, name) is None:
-            raise InputError(f"speed, {who}: the car's file has no {name} ({unit}); give it.")
-    return {name: getattr(car, name) for name in keys}
+    return {name: number_of(car, name, f"speed, {who}", unit) for name, unit in keys.items()}
 
 
 def forces_of_axles(car: SpeedCar, push: Any) -> tuple[Any, Any]:
