@@ -3,8 +3,8 @@
 The Gaussian filters of `jaxveh.filters` use a `StateSpace`, whose process noise has one law for all rows. A road changes with
 distance and not with time, so here the noise is given with every step. A step is a few products of small matrices.
 
-`predict`, `innovation` and `update` work on vectors; `belief_of`, `move`, `correct` and `spread_of` on states with named
-fields.
+`predict`, `implicit_step`, `innovation` and `update` work on vectors; `belief_of`, `move`, `correct` and `spread_of` on states
+with named fields.
 """
 
 from __future__ import annotations
@@ -124,6 +124,16 @@ def spread_of(belief: Belief, weights: Mapping[str, Any], state_type: Any) -> An
     """The standard deviation of a sum of states with `weights` by name, in a `belief`."""
     h = _vector(weights, state_type, belief.mean.dtype)
     return numerics.sqrt(jnp.maximum(h @ belief.covariance @ h, 0.0))
+
+
+def implicit_step(rates: Callable[[Any], Any], x: Any, dt: Any) -> tuple[Any, Any]:
+    """The change (2,) of the first two of the states x (n,), which have these `rates` (2,), and its slopes (2, n), in a linearly
+    implicit trapezoidal step: stable however fast they are."""
+    rate, slope = rates(x), jax.jacfwd(rates)(x)
+    left = jnp.eye(2, dtype=x.dtype) - 0.5 * dt * slope[:, :2]
+    determinant = left[0, 0] * left[1, 1] - left[0, 1] * left[1, 0]
+    inverse = jnp.stack([jnp.stack([left[1, 1], -left[0, 1]]), jnp.stack([-left[1, 0], left[0, 0]])]) / determinant
+    return dt * (inverse @ rate), dt * (inverse @ slope)
 
 
 def _vector(values: Mapping[str, Any], state_type: Any, dtype: Any) -> Any:

@@ -14,6 +14,7 @@ from jaxveh.estimators.friction.along import AlongEvidence
 from jaxveh.estimators.friction.laws import LEAST_FRICTION, PlanarCar
 from jaxveh.estimators.friction.motion import Told, next_told, start_told
 from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.sequential import implicit_step
 from jaxveh.estimators.two_axles import LATERAL
 from jaxveh.vehicles import GRAVITY
 
@@ -205,16 +206,9 @@ class FrictionBank(AbstractMethod):
         fades = jnp.stack([same, same, dies, dies, same, jnp.exp(-dt / STEER_TIME), same, same])
 
         def one(x, P, friction):
-            rates = lambda x: self._rates(x, friction, told)
-            rate, slope = rates(x), jax.jacfwd(rates)(x)
-            left = jnp.eye(2, dtype=x.dtype) - 0.5 * dt * slope[:, :2]
-            determinant = left[0, 0] * left[1, 1] - left[0, 1] * left[1, 0]
-            inverse = jnp.stack([
-                jnp.stack([left[1, 1], -left[0, 1]]), jnp.stack([-left[1, 0], left[0, 0]])
-            ]) / determinant  # fmt: skip
-            step = jnp.diag(fades).at[:2].add(dt * (inverse @ slope))
-            x = (fades * x).at[:2].add(dt * (inverse @ rate))
-            return x, step @ P @ step.T + noise
+            change, slopes = implicit_step(lambda x: self._rates(x, friction, told), x, dt)
+            step = jnp.diag(fades).at[:2].add(slopes)
+            return (fades * x).at[:2].add(change), step @ P @ step.T + noise
 
         means, covariances = jax.vmap(one)(bank.means, bank.covariances, self.frictions)
         return Bank(bank.weights, means, covariances)

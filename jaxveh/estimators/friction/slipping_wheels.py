@@ -11,7 +11,7 @@ from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.friction.along import LEAST_SLIP, Slips
 from jaxveh.estimators.friction.scalar import Follower, LogFriction
-from jaxveh.estimators.friction.wheels import AbstractWheelMethod, WheelMemory, WheelSlips
+from jaxveh.estimators.friction.wheels import AbstractWheelMethod, WheelMemory
 from jaxveh.estimators.method import answer
 from jaxveh.tyres import Contact, LuGre
 
@@ -38,7 +38,6 @@ class WheelObserver(AbstractWheelMethod):
     above `enough`. It gives no standard deviation.
     """
 
-    slips: WheelSlips
     law: LuGre | None = None
     stiffness_ratio: jax.Array = positive("-", default=1.0)
     gain: jax.Array = positive("1/s", default=20.0)
@@ -47,15 +46,12 @@ class WheelObserver(AbstractWheelMethod):
     usual: jax.Array = positive("-", default=0.8)
     enough: jax.Array = positive("-", default=0.1)
 
-    def first(self, t, values):
-        wheels = self.slips.start(t, values)
-        zero = jnp.zeros_like(t)
-        start = ObserverMemory(wheels, wheels.wheels.speed, zero + self.usual, zero)
-        return start, self._answer(start)
+    def begin(self, wheels):
+        zero = jnp.zeros_like(wheels.told.t)
+        return ObserverMemory(wheels, wheels.wheels.speed, zero + self.usual, zero)
 
-    def next(self, memory, t, values):
-        dt = jnp.clip(t - memory.wheels.told.t, 0.0, 0.1)
-        wheels, seen = self.slips.next(memory.wheels, t, values)
+    def follow(self, memory, wheels, seen, dt):
+        dt = jnp.minimum(dt, 0.1)
         one = self.slips.wheels
         speed = wheels.wheels.speed
         load = seen.load * self.slips.nominal()
@@ -82,8 +78,7 @@ class WheelObserver(AbstractWheelMethod):
         slips = seen.there & (jnp.abs(seen.slip) > LEAST_SLIP)
         excited = jnp.max(jnp.where(slips, jnp.abs(force - seen.slip * stiff) / load, 0.0))
         excitation = memory.excitation + share * (excited - memory.excitation)
-        after = ObserverMemory(wheels, observed, friction, excitation)
-        return after, self._answer(after)
+        return ObserverMemory(wheels, observed, friction, excitation)
 
     def _forces(self, seen: Slips, wheels: WheelMemory, mu):
         load = seen.load * self.slips.nominal()
@@ -94,7 +89,7 @@ class WheelObserver(AbstractWheelMethod):
         contact = Contact(slip_ratio=seen.slip, load=load, friction=mu, speed=v_x, slip_speed=v_x)
         return self.law.forces(contact, self.law.start(contact)).F_x
 
-    def _answer(self, memory: ObserverMemory):
+    def say(self, memory):
         known = memory.wheels.told.moves & (memory.excitation > self.enough)
         return answer({"friction": memory.friction}, known=known)
 
@@ -118,7 +113,6 @@ class SidesApart(AbstractWheelMethod):
     load. `rolls` (-): force over load below which a wheel rolls freely.
     """
 
-    slips: WheelSlips
     follower: Follower
     stiffness_ratio: jax.Array = positive("-", default=1.0)
     slip_noise: jax.Array = positive("-", default=0.004)
@@ -127,15 +121,11 @@ class SidesApart(AbstractWheelMethod):
     learning: jax.Array = positive("s", default=2.0)
     rolls: jax.Array = parameter("-", scale=0.05, default=0.05)
 
-    def first(self, t, values):
-        wheels = self.slips.start(t, values)
+    def begin(self, wheels):
         start = self.follower.start()
-        memory = SidesMemory(wheels, jnp.zeros_like(wheels.wheels.speed), start, start)
-        return memory, self._answer(memory)
+        return SidesMemory(wheels, jnp.zeros_like(wheels.wheels.speed), start, start)
 
-    def next(self, memory, t, values):
-        dt = jnp.clip(t - memory.wheels.told.t, 0.0, 1.0)
-        wheels, seen = self.slips.next(memory.wheels, t, values)
+    def follow(self, memory, wheels, seen, dt):
         curves, nominal = self.slips.curves(self.stiffness_ratio), self.slips.nominal()
         stiffness = jnp.stack([curve.stiffness for curve in curves])
         free = seen.there & (jnp.abs(seen.force) < self.rolls * seen.load * nominal)
@@ -156,10 +146,9 @@ class SidesApart(AbstractWheelMethod):
             # The filter of a side takes this step twice, once per wheel, so that it also forgets twice.
             tells = seen.there[k] & (jnp.abs(slip) > LEAST_SLIP)
             sides[k % 2] = self.follower.next(state, dt, residual, noise, tells)
-        after = SidesMemory(wheels, offset, *sides)
-        return after, self._answer(after)
+        return SidesMemory(wheels, offset, *sides)
 
-    def _answer(self, memory: SidesMemory):
+    def say(self, memory):
         moves = memory.wheels.told.moves
         left, right = (self.follower.says(side, moves) for side in (memory.left, memory.right))
         mean = {"friction": 0.5 * (left[0] + right[0]), "friction_left": left[0], "friction_right": right[0]}

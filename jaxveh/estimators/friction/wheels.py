@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -14,7 +15,7 @@ from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction.along import CORNERS, LEAST_SLIP, Slips, WheelForces, WheelsTold
 from jaxveh.estimators.friction.laws import PlanarCar, SimilarCurve
 from jaxveh.estimators.friction.motion import Told, next_told, start_told
-from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.method import AbstractMethod, Answer, answer
 
 SPEED = (Need("v_x", "m/s"),)
 WHEEL_CHANNELS = tuple(
@@ -73,13 +74,35 @@ class WheelSlips(eqx.Module):
 
 
 class AbstractWheelMethod(AbstractMethod):
-    """A method that uses the wheels' slips and forces; `slips` computes them."""
+    """A method that uses the wheels' slips and forces; `slips` computes them. Its memory has theirs in a field `wheels`."""
 
-    slips: eqx.AbstractVar[WheelSlips]
+    slips: WheelSlips
 
     @property
     def needs(self):
         return (*SPEED, *WHEEL_CHANNELS, *MORE)
+
+    @abc.abstractmethod
+    def begin(self, wheels: WheelMemory) -> Any:
+        """The memory after the first row."""
+
+    @abc.abstractmethod
+    def follow(self, memory: Any, wheels: WheelMemory, seen: Slips, dt: Any) -> Any:
+        """The memory after the next row, at most a second (`dt`, s) later."""
+
+    @abc.abstractmethod
+    def say(self, memory: Any) -> Answer:
+        """The answer to the row of this memory."""
+
+    def first(self, t, values):
+        memory = self.begin(self.slips.start(t, values))
+        return memory, self.say(memory)
+
+    def next(self, memory, t, values):
+        dt = jnp.clip(t - memory.wheels.told.t, 0.0, 1.0)
+        wheels, seen = self.slips.next(memory.wheels, t, values)
+        memory = self.follow(memory, wheels, seen, dt)
+        return memory, self.say(memory)
 
 
 class SlopeMemory(NamedTuple):
@@ -104,7 +127,6 @@ class SlipSlope(AbstractWheelMethod):
     only refers to the slope: it is known within a tenth.
     """
 
-    slips: WheelSlips
     stiffness_ratio: jax.Array = positive("-", default=1.0)
     exponent: jax.Array = positive("-", default=1.0)
     calibration_spread: jax.Array = positive("-", default=0.3)
@@ -112,15 +134,11 @@ class SlipSlope(AbstractWheelMethod):
     used: jax.Array = positive("-", default=0.3)
     memory: jax.Array = positive("s", default=60.0)
 
-    def first(self, t, values):
-        wheels = self.slips.start(t, values)
-        usual, zero = self._usual(), jnp.zeros_like(t)
-        start = SlopeMemory(wheels, jnp.stack([usual, zero, zero]), self._spread())
-        return start, self._answer(start)
+    def begin(self, wheels):
+        usual, zero = self._usual(), jnp.zeros_like(wheels.told.t)
+        return SlopeMemory(wheels, jnp.stack([usual, zero, zero]), self._spread())
 
-    def next(self, memory, t, values):
-        dt = jnp.clip(t - memory.wheels.told.t, 0.0, 1.0)
-        wheels, seen = self.slips.next(memory.wheels, t, values)
+    def follow(self, memory, wheels, seen, dt):
         mean, stays = memory.mean, jnp.exp(-dt / self.memory)
         # Forgetting leads back to the covariance before the drive.
         P = stays**2 * memory.covariance + (1.0 - stays**2) * self._spread()
@@ -134,8 +152,7 @@ class SlipSlope(AbstractWheelMethod):
             gain = jnp.where(here, across / (phi @ across + rough), 0.0)
             mean = mean + gain * (slip - phi @ mean)
             P = P - jnp.outer(gain, across)
-        after = SlopeMemory(wheels, mean, 0.5 * (P + P.T))
-        return after, self._answer(after)
+        return SlopeMemory(wheels, mean, 0.5 * (P + P.T))
 
     def _usual(self):
         car = self.slips.car
@@ -145,7 +162,7 @@ class SlipSlope(AbstractWheelMethod):
         usual = self._usual()
         return jnp.diag(jnp.square(jnp.stack([0.5 * usual, 0.02 + 0.0 * usual, 0.02 + 0.0 * usual])))
 
-    def _answer(self, memory: SlopeMemory):
+    def say(self, memory):
         usual = self._usual()
         compliance = jnp.clip(memory.mean[0], usual / 1.5, 10.0 * usual)
         friction = jnp.exp(self.exponent * jnp.log(usual / compliance))
@@ -181,21 +198,17 @@ class Reconstruction(AbstractWheelMethod):
     small.
     """
 
-    slips: WheelSlips
     stiffness_ratio: jax.Array = positive("-", default=1.0)
     least_rate: jax.Array = positive("1/s", default=0.05)
     lag: jax.Array = positive("s", default=0.1)
     bent: jax.Array = positive("-", default=0.4)
     memory: jax.Array = positive("s", default=0.5)
 
-    def first(self, t, values):
-        wheels, zero = self.slips.start(t, values), jnp.zeros_like(t)
-        start = CurveMemory(wheels, zero, zero, zero + self._steepest(), zero + 1.0, zero + 10.0)
-        return start, self._answer(start)
+    def begin(self, wheels):
+        zero = jnp.zeros_like(wheels.told.t)
+        return CurveMemory(wheels, zero, zero, zero + self._steepest(), zero + 1.0, zero + 10.0)
 
-    def next(self, memory, t, values):
-        dt = jnp.clip(t - memory.wheels.told.t, 0.0, 1.0)
-        wheels, seen = self.slips.next(memory.wheels, t, values)
+    def follow(self, memory, wheels, seen, dt):
         normal = jnp.where(seen.there, seen.force / (seen.load * self.slips.nominal()), 0.0)
         most = jnp.argmax(jnp.abs(normal))
         sign = jnp.sign(normal[most])
@@ -212,14 +225,13 @@ class Reconstruction(AbstractWheelMethod):
         peak = used / jnp.maximum(1.0 - rest**3, 0.05)
         bends = here & (slope < self.bent * steepest) & (age < self.memory)
         friction = jnp.where(bends, peak, jnp.maximum(memory.friction, used))
-        after = CurveMemory(wheels, slip, used, slope, friction, age)
-        return after, self._answer(after)
+        return CurveMemory(wheels, slip, used, slope, friction, age)
 
     def _steepest(self):
         car = self.slips.car
         return self.stiffness_ratio * (car.front.stiffness + car.rear.stiffness) / sum(car.static_loads())
 
-    def _answer(self, memory: CurveMemory):
+    def say(self, memory):
         bends = (memory.slope < self.bent * self._steepest()) & (memory.age < self.memory)
         known = memory.wheels.told.moves & bends & (memory.slip > LEAST_SLIP)
         return answer({"friction": memory.friction}, known=known)

@@ -11,7 +11,7 @@ from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractSmoothable, answer
-from jaxveh.estimators.sequential import Belief, innovation, update
+from jaxveh.estimators.sequential import Belief, implicit_step, innovation, update
 from jaxveh.estimators.stiffness.single_track import LEAN, Followed, LinearCar, Signals
 from jaxveh.estimators.two_axles import LATERAL, LOWEST
 
@@ -150,17 +150,14 @@ class WalkingStiffness(AbstractSmoothable):
             turn = (car.front_axle_to_cg * front - car.rear_axle_to_cg * rear) / car.yaw_inertia
             return jnp.stack([push - now.v_x * x[1], turn])
 
-        rate, slope = rates(x), jax.jacfwd(rates)(x)
-        left = jnp.eye(2, dtype=x.dtype) - 0.5 * dt * slope[:, :2]
-        determinant = left[0, 0] * left[1, 1] - left[0, 1] * left[1, 0]
-        inverse = jnp.stack([jnp.stack([left[1, 1], -left[0, 1]]), jnp.stack([-left[1, 0], left[0, 0]])]) / determinant
-        step = jnp.eye(STATES, dtype=x.dtype).at[:2].add(dt * (inverse @ slope)).at[8, 1].set(dt)
+        change, slopes = implicit_step(rates, x, dt)
+        step = jnp.eye(STATES, dtype=x.dtype).at[:2].add(slopes).at[8, 1].set(dt)
         slow = 0.0 * dt
         walks = jnp.stack([
             self.v_y_noise, self.yaw_noise, self.walk, self.walk, self.steer_noise, 0.002 + slow, 1e-5 + slow, 1e-4 + slow,
             2e-3 + slow, 1e-5 + slow,
         ])  # fmt: skip
-        moved = x.at[:2].add(dt * (inverse @ rate)).at[8].add(dt * x[1])
+        moved = x.at[:2].add(change).at[8].add(dt * x[1])
         return Belief(moved, step @ belief.covariance @ step.T + jnp.diag(jnp.square(walks) * dt))
 
     def say(self, memory):
