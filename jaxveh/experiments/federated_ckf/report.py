@@ -26,7 +26,7 @@ from jaxveh.experiments.federated_ckf.criteria import (
 from jaxveh.experiments.federated_ckf.drives import Drive
 from jaxveh.experiments.federated_ckf.observed import observability_of_drives
 from jaxveh.experiments.federated_ckf.road_drives import drives_on_roads, road_cases
-from jaxveh.experiments.federated_ckf.road_filters import ROAD_START, RacedOnRoads, race_on_roads
+from jaxveh.experiments.federated_ckf.road_filters import ROAD_START, race_on_roads
 from jaxveh.experiments.federated_ckf.road_tables import road_tables, speed_table
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Start, Study
 from jaxveh.experiments.federated_ckf.study import Raced, cases, drives_by_case, drives_of, race, race_over, truth
@@ -54,7 +54,7 @@ class Reproduction(NamedTuple):
     spreads: tuple[float, ...]
     over: Swept
     seen: dict[str, list[list[Observability]]]
-    roads: RacedOnRoads
+    roads: Raced
 
 
 def run(

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh.experiments.federated_ckf.road_filters import RacedOnRoads
 from jaxveh.experiments.federated_ckf.study import Raced
 from jaxveh.plots import COLOURS, kit, style
 
@@ -52,7 +51,7 @@ def speeds_figure(raced: Raced, shown: dict[str, str], case: str = "printed star
     return figure
 
 
-def friction_figure(raced: RacedOnRoads, cases: tuple[str, ...] = ("split mu", "mu jump")) -> Any:
+def friction_figure(raced: Raced, cases: tuple[str, ...] = ("split mu", "mu jump")) -> Any:
     """Friction under each wheel over time: medians over seeds, quartiles as bands; the truth of the first seed."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 7.0), layout="constrained")
     step = round(EVERY / raced.study.dt)

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 
 from jaxveh import filters, numerics, sweeps
 from jaxveh._core.names import record_type
@@ -17,6 +16,7 @@ from jaxveh.experiments.federated_ckf.drives import FRICTIONS, Drive, times
 from jaxveh.experiments.federated_ckf.model import INPUTS, planar, rows_of, states_model
 from jaxveh.experiments.federated_ckf.road_drives import road_cases
 from jaxveh.experiments.federated_ckf.settings import OTHER_START, PARAMETERS, Study
+from jaxveh.experiments.federated_ckf.study import Raced
 from jaxveh.statespace import Row, StateSpace, kit, with_parameters
 from jaxveh.sweeps import IN_MEMORY, Stores
 from jaxveh.vehicles import kit as vehicles_kit
@@ -152,20 +152,6 @@ def _true_mass() -> float:
     return mass
 
 
-class RacedOnRoads(NamedTuple):
-    """`drives` by case, (cases, seeds, T, ...), and the results of the estimators, `found`, with the axes estimator, case
-    (by number) and seed."""
-
-    study: Study
-    cases: tuple[str, ...]
-    drives: Drive
-    found: sweeps.Swept
-
-    def at(self, name: str, estimator: str, case: str) -> np.ndarray:
-        """Values of one estimator in one case, (seeds, ...)."""
-        return self.found.at(name, estimator=estimator, case=float(self.cases.index(case)))
-
-
 def race_on_roads(
     study: Study,
     drives: Drive,
@@ -173,7 +159,7 @@ def race_on_roads(
     only: tuple[str, ...] | None = None,
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
-) -> RacedOnRoads:
+) -> Raced:
     """Every estimator (or `only` these) on the drives of every road."""
     every, cases = road_contestants(study), tuple(road_cases(study))
 
@@ -184,4 +170,4 @@ def race_on_roads(
     design = sweeps.Design(estimator=chosen, case=range(len(cases)))
     run = lambda point, drive: point.estimator(drive)
     found = stores.sweep("road-race", run, design, data=drives, progress=progress)
-    return RacedOnRoads(study, cases, drives, found)
+    return Raced(study, cases, drives, found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from jaxveh.experiments.federated_ckf.contestants import contestants
 from jaxveh.experiments.federated_ckf.road_drives import road_cases
-from jaxveh.experiments.federated_ckf.road_filters import ROAD_START, RacedOnRoads, road_contestants
+from jaxveh.experiments.federated_ckf.road_filters import ROAD_START, road_contestants
 from jaxveh.experiments.federated_ckf.study import Raced
 from jaxveh.experiments.report import spread
 from jaxveh.sweeps import Table
@@ -26,7 +26,7 @@ def speed_table(raced: Raced, cases: tuple[str, ...]) -> Table:
     )
 
 
-def road_tables(raced: RacedOnRoads) -> list[Table]:
+def road_tables(raced: Raced) -> list[Table]:
     """One table per road: errors of speeds, friction on both sides and mass, and the consistency of the friction's
     variance."""
     whats, begun = road_contestants(raced.study), f"from mu {ROAD_START.friction:g}"
