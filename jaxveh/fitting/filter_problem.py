@@ -1,10 +1,10 @@
 """The common part of fits by a filter's likelihood."""
 
-# No postponed annotations here: equinox does not see an AbstractVar in a string.
+from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
@@ -17,15 +17,16 @@ from jaxveh.statespace import StateSpace
 class AbstractFilterProblem(AbstractProblem):
     """A cost of leaves of a filter's model; its coordinates are the parameters (p,) on the real line of their bijectors.
 
-    `counts` (recordings,): how many times each recording counts. `centre`, `spread` (p,): mean and standard deviation of the
-    prior on that line; infinite for no prior.
+    `rows` of the recordings; `counts` (recordings,): how many times each counts. `centre`, `spread` (p,): mean and standard
+    deviation of the prior on that line; infinite for no prior.
     """
 
-    filter: eqx.AbstractVar[AbstractFilter]
-    model: eqx.AbstractVar[StateSpace]
-    counts: eqx.AbstractVar[jax.Array]
-    centre: eqx.AbstractVar[jax.Array]
-    spread: eqx.AbstractVar[jax.Array]
+    filter: AbstractFilter
+    model: StateSpace
+    rows: Any
+    counts: jax.Array
+    centre: jax.Array
+    spread: jax.Array
 
     def start(self):
         return on_line(self.chosen, pick(self.model, self.chosen))

@@ -33,12 +33,6 @@ class LikelihoodProblem(AbstractFilterProblem):
     draw particles.
     """
 
-    filter: AbstractFilter
-    model: StateSpace
-    rows: tuple
-    counts: jax.Array
-    centre: jax.Array
-    spread: jax.Array
     key: Any
     chosen: tuple[Parameter, ...] = eqx.field(static=True)
 

@@ -59,12 +59,6 @@ class PredictionErrorProblem(AbstractFilterProblem):
     do not count.
     """
 
-    filter: AbstractFilter
-    model: StateSpace
-    rows: Any
-    counts: jax.Array
-    centre: jax.Array
-    spread: jax.Array
     target: Any
     warm_up: int = eqx.field(static=True)
     chosen: tuple[Parameter, ...] = eqx.field(static=True)
