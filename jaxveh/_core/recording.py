@@ -202,6 +202,12 @@ class Recording(Kept, eqx.Module):
         )
 
 
+def time_for(recording: Recording, dtype: Any) -> jax.Array | np.ndarray:
+    """The time of a recording (T,), s; from its first row where `dtype` would not resolve the steps of stamps since 1970."""
+    time = recording.time
+    return time - time[0] if isinstance(time, np.ndarray) and dtype != np.float64 else time
+
+
 def _of_strangers(labelled: Labelled) -> Recording:
     """Make a recording of every variable whose only dimension is `time`."""
     time = labelled.both.get(TIME)

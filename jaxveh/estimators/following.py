@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, is_concrete
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, time_for
 from jaxveh.estimators.contract import check_needs
 from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable, Answer, Answers, dtype_of
 from jaxveh.estimators.sequential import Belief
@@ -40,13 +40,12 @@ def follow(who: str, method: AbstractMethod, recording: Recording, *, smoothed: 
     check_needs(who, tuple(need._replace(optional=False) for need in there), recording)
     for need in there:
         _check_finite(who, need.channel, recording)
-    dtype, time = dtype_of(method), recording.time
-    if isinstance(time, np.ndarray) and dtype != np.float64:
-        time = time - time[0]
+    dtype = dtype_of(method)
     none = jnp.full(len(recording), jnp.nan, dtype)
     values = {need.channel: none for need in method.needs}
     values |= {need.channel: jnp.asarray(recording[need.channel]).astype(dtype) for need in there}
-    said = (smooth_rows if smoothed else follow_rows)(method, jnp.asarray(time).astype(dtype), values)
+    time = jnp.asarray(time_for(recording, dtype)).astype(dtype)
+    said = (smooth_rows if smoothed else follow_rows)(method, time, values)
     return Answers(recording.time, said.mean, said.std, said.known, said.result)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, time_for
 from jaxveh.estimators.parameter_bands import Members
 from jaxveh.numerics import apart
 from jaxveh.statespace import AbstractFilter, Info, Row, StateSpace, kit
@@ -65,10 +65,7 @@ def clean_recording(cleaning: AbstractCleaning, recording: Recording) -> Recordi
     if not values:
         return recording
     dtype = next(iter(values.values())).dtype
-    time = recording.time
-    if isinstance(time, np.ndarray) and dtype != np.float64:
-        time = time - time[0]
-    return recording.replace(**_clean_rows(cleaning, jnp.asarray(time, dtype), values))
+    return recording.replace(**_clean_rows(cleaning, jnp.asarray(time_for(recording, dtype), dtype), values))
 
 
 @eqx.filter_jit

@@ -13,7 +13,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, float_array, is_concrete
 from jaxveh._core.names import check_names, record
 from jaxveh._core.parameter import UNNAMED
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, time_for
 from jaxveh._core.traced import trace_once
 from jaxveh.statespace.dependent_noise import MeasurementNoise, StateDependent
 from jaxveh.statespace.noise import AbstractNoise, Gaussian
@@ -165,10 +165,8 @@ class StateSpace(eqx.Module):
         dtype = self.prior.mean[0].dtype
         u = {name: _channel(recording, name, dtype, is_input=True) for name in self.inputs}
         y = {name: _channel(recording, name, dtype, is_input=False) for name in self.channels}
-        time = recording.time
-        if isinstance(time, np.ndarray) and dtype != np.float64:
-            time = time - time[0]
-        return Row(jnp.asarray(time, dtype), record("Inputs", u), record("Measurements", y))
+        time = jnp.asarray(time_for(recording, dtype), dtype)
+        return Row(time, record("Inputs", u), record("Measurements", y))
 
     def row(self, t, u: Mapping, y: Mapping) -> Row:
         """One row for a live loop from plain numbers; channels left out of `y` are missing."""

@@ -36,8 +36,7 @@ class HInfinityShare(HInfinity):
         check("HInfinityShare.share", self.share, lambda s: (s > 0) & (s < 1), "between 0 and 1")
 
     def update(self, model, belief, row):
-        scales, dtype = dict(self.scales), belief.vector.dtype
-        weights = jnp.asarray([1.0 / scales[n] ** 2 if n in scales else 0.0 for n in model.states], dtype)
+        weights, dtype = self._weights(model, belief), belief.vector.dtype
         trace = jnp.sum(weights * jnp.sum(jnp.square(belief.factor), axis=1))
         bound = jnp.minimum(self.bound.astype(dtype), self.share.astype(dtype) / trace)
         return HInfinity(self.inner, bound, self.scales).update(model, belief, row)

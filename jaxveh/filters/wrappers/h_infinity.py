@@ -41,9 +41,13 @@ class HInfinity(AbstractStateless):
         self.inner.check(model)
         check_names("HInfinity.scales", [name for name, _ in self.scales], model.states)
 
+    def _weights(self, model, belief):
+        """The diagonal of S."""
+        scales = dict(self.scales)
+        return jnp.asarray([1.0 / scales[n] ** 2 if n in scales else 0.0 for n in model.states], belief.vector.dtype)
+
     def update(self, model, belief, row):
-        scales, dtype = dict(self.scales), belief.vector.dtype
-        weights = jnp.asarray([1.0 / scales[n] ** 2 if n in scales else 0.0 for n in model.states], dtype)
+        weights, dtype = self._weights(model, belief), belief.vector.dtype
         information = numerics.inverse_psd(numerics.lower_factor(belief.factor))
         information = information - jnp.diag(self.bound.astype(dtype) * weights)
         wider = numerics.inverse_psd(numerics.cholesky(information))
