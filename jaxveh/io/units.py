@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from typing import TypeGuard
 
 import numpy as np
@@ -12,15 +13,32 @@ from jaxveh.io.optional import require
 
 _NOT_GIVEN = frozenset({"", "-", "--", "none", "n/a", "na", "nan", "unknown", "?"})
 
-# Units that pint does not know or takes for something else (`Nm` as number times metre, `g` as gram).
+# Units that pint does not know or takes for something else (`Nm` as number times metre, `g` as gram, `kmph` as 1000 mph).
 _ALIASES = {"m/s2": "m/s^2", "m/s/s": "m/s^2", "mps": "m/s", "mps2": "m/s^2", "kmh": "km/h", "Nm": "N*m", "N m": "N*m"}
-_ALIASES |= {"kNm": "kN*m", "U/min": "rpm", "1": "dimensionless"}
+_ALIASES |= {"kNm": "kN*m", "N-m": "N*m", "U/min": "rpm", "1": "dimensionless", "N/m2": "N/m^2"}
 _ALIASES_FOR = {
-    "m/s^2": {"g": "standard_gravity", "G": "standard_gravity", "m/s**2": "m/s^2"},
+    "m/s^2": {"g": "standard_gravity", "G": "standard_gravity", "mg": "millistandard_gravity", "m/s**2": "m/s^2"},
     # An angle has no dimension, so that 1/s is a valid name for rad/s; hertz and per cent are not.
-    "rad/s": {"1/s": "rad/s", "s^-1": "rad/s", "1/min": "rpm"},
+    "rad/s": {"1/s": "rad/s", "s^-1": "rad/s", "1/min": "rpm", "min^-1": "rpm", "rev/min": "rpm"},
     "rad": {"1": "rad"},
 }
+_IN_ANY_CASE = {
+    "km/h": ("km/h", "kmh", "kph", "kmph", "km/hr"), "mph": ("mph",), "deg": ("deg", "degree", "degrees"),
+    "deg/s": ("deg/s", "dps", "degps", "deg/sec", "degree/s", "degrees/s"), "rad": ("rad",), "rad/s": ("rad/s",),
+    "rpm": ("rpm",), "bar": ("bar",), "psi": ("psi",), "kPa": ("kpa",), "percent": ("percent", "pct"), "s": ("sec",),
+}  # fmt: skip
+"""Spellings that mean the same in capitals and in small letters, by the unit."""
+_SPELLINGS = {spelling: unit for unit, spellings in _IN_ANY_CASE.items() for spelling in spellings}
+
+_PREFIXED = {
+    "meter": ("kilo", "deci", "centi", "milli", "micro"), "second": ("milli", "micro", "nano"), "gram": ("kilo", "milli"),
+    "newton": ("kilo", "mega", "deca"), "pascal": ("hecto", "kilo", "mega"), "bar": ("milli",), "joule": ("kilo",),
+    "radian": ("milli", "micro"), "standard_gravity": ("milli",), "hertz": ("kilo", "mega"),
+}  # fmt: skip
+"""The prefixes with which a unit is in use. pint puts any prefix in front of any unit: `Grad` would be a gigaradian."""
+
+_GRAD = re.compile(r"grad\b", re.IGNORECASE)
+_POWER = re.compile(r"(?<=[A-Za-z])-(?=\d)")
 
 
 def is_unit(unit: str | None) -> TypeGuard[str]:
@@ -42,18 +60,20 @@ def convert(values, unit: str, target: str, what: str) -> np.ndarray:
 
     **Raises** `InputError` for an unknown unit, or a unit of another quantity.
     """
-    unit = unit.strip()
+    said = unit.strip()
+    if said == target:
+        return np.asarray(values)
+    unit = _spelled(said, target)
     if unit == target:
         return np.asarray(values)
-    unit = _ALIASES_FOR.get(target, {}).get(unit, _ALIASES.get(unit, unit))
-    if unit == target:
-        return np.asarray(values)
+    if _GRAD.match(unit):
+        raise InputError(f"{what}: unit {said!r} may be degrees or gradians. Write `deg` (in a channel map), or `gon`.")
     registry = _registry()
     try:
         source, wanted = _parse(unit), _parse(_ALIASES.get(target, target))
     except Exception as error:  # pint raises its own, AttributeError, ValueError and tokenizer errors alike
         raise InputError(
-            f"{what}: unit {unit!r} is not known. Write it as in `m/s`, `deg/s`, `m/s^2`, `km/h`, `N*m`, `g`."
+            f"{what}: unit {said!r} is not known. Write it as in `m/s`, `deg/s`, `m/s^2`, `km/h`, `N*m`, `g`."
         ) from error
     if registry.get_root_units(source)[1] != registry.get_root_units(wanted)[1]:
         raise InputError(
@@ -70,4 +90,18 @@ def _registry():
 
 @functools.cache
 def _parse(unit: str):
-    return _registry().parse_units(unit)
+    """Return the unit of pint; raise `ValueError` for a unit with a prefix that is not in use."""
+    registry = _registry()
+    parsed = registry.parse_units(unit)
+    for name in dict(registry.Quantity(1.0, parsed).unit_items()):
+        prefix, plain, _ = registry.parse_unit_name(name)[0]
+        if prefix and prefix not in _PREFIXED.get(plain, ()):
+            raise ValueError(f"{prefix} in front of {plain}")
+    return parsed
+
+
+def _spelled(unit: str, target: str) -> str:
+    """Return a unit in the spelling of pint, or unchanged."""
+    unit = _POWER.sub("^-", " ".join(unit.replace("º", "°").split()))
+    unit = _SPELLINGS.get(unit.casefold(), unit)
+    return _ALIASES_FOR.get(target, {}).get(unit, _ALIASES.get(unit, unit))

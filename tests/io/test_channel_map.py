@@ -154,6 +154,60 @@ def test_units_of_another_thing(unit, target):
         convert(np.array([1.0]), unit, target, "channel")
 
 
+SPELLINGS = {
+    ("km/h", "m/s"): ["KM/H", "Km/h", "kph", "KPH", "kmph", "kmh", "km h-1", "km/hr"],
+    ("deg", "rad"): ["Deg", "DEG", "degrees", "°", "º"],
+    ("deg/s", "rad/s"): ["Deg/s", "DEG/S", "dps", "degps", "deg/sec", "º/s", "deg s-1", "deg.s-1", "deg·s⁻¹"],
+    ("rpm", "rad/s"): ["RPM", "U/min", "1/min", "min-1", "rev/min"],
+    ("m/s^2", "m/s^2"): ["m/s²", "m/s2", "m s-2", "m.s-2", "m\xa0s-2"],
+    ("bar", "Pa"): ["Bar", "BAR"],
+    ("kPa", "Pa"): ["KPA", "kpa"],
+    ("percent", "1"): ["%", "Percent", "pct"],
+    ("N*m", "N*m"): ["Nm", "N m", "N·m", "N-m", "N.m"],
+    ("0.001 g", "m/s^2"): ["mg"],
+}
+
+
+@pytest.mark.parametrize(("unit", "target"), SPELLINGS)
+def test_spellings_of_loggers(unit, target):
+    number, plain = unit.split() if " " in unit else (1.0, unit)
+    expected = float(number) * convert(1.0, plain, target, "channel")
+    for spelling in SPELLINGS[unit, target]:
+        np.testing.assert_allclose(convert(1.0, spelling, target, "channel"), expected, rtol=1e-14, err_msg=spelling)
+
+
+IN_USE = """
+    km/h kph m/s cm/s mm/s km/s um/s dm/s kmph mm/h cm/h um/h dm/h km/min cm/min mm/min um/min dm/min
+    rad mrad urad rad/s mrad/s urad/s kPa hPa MPa Pa mbar bar N kN MN daN
+"""
+"""What a prefix (or none) before one of the units of the next test may give."""
+
+
+@pytest.mark.parametrize("prefix", [*"YZEPTGMkhdcmunpazy", "da"])
+def test_a_prefix_that_nobody_uses_is_no_unit(prefix):
+    units = {
+        "m/s": ("mph", "kph", "fps", "knot", "m/s", "m/h", "m/min"),
+        "rad": ("rad", "deg", "degree", "turn", "arcmin"),
+        "rad/s": ("rpm", "rad/s", "deg/s"),
+        "Pa": ("psi", "bar", "Pa"),
+        "N": ("N", "lbf", "kgf"),
+        "1": ("percent",),
+    }
+    for target, some in units.items():
+        for unit in (prefix + one for one in some):
+            if unit in IN_USE.split():
+                convert(1.0, unit, target, "channel")
+            else:
+                with pytest.raises(InputError, match=r"is not known|of another quantity|may be"):
+                    convert(1.0, unit, target, "channel")
+
+
+@pytest.mark.parametrize("unit", ["grad", "Grad", "GRAD", "grad/s", "Grad/s", "Grad/sec"])
+def test_gradians_or_degrees_is_asked(unit):
+    with pytest.raises(InputError, match=r"channel: unit '.*' may be degrees or gradians. Write `deg`"):
+        convert(1.0, unit, "rad/s" if "/" in unit else "rad", "channel")
+
+
 def test_missing_pint(log, toml, monkeypatch):
     from jaxveh.io import units
 
