@@ -28,7 +28,9 @@ class MdfLog(Log):
         masters = set(mdf.masters_db.items())
         places = {name: [place for place in found if place not in masters] for name, found in mdf.channels_db.items()}
         self._places = {name: found for name, found in places.items() if found}
-        self.names = tuple(self._places)
+        # asammdf also finds `yaw_rate\\ETKC:1` by its part before the device; that is no channel of its own.
+        called = lambda place: mdf.groups[place[0]].channels[place[1]].name
+        self.names = tuple(name for name, found in self._places.items() if name in map(called, found))
 
     def column(self, name: str, group: int | None = None) -> Column:
         """Load one channel; `group` selects one if several groups have a channel of this name."""
@@ -38,14 +40,18 @@ class MdfLog(Log):
         what = f"{self.path}: channel {name!r}"
         if len(found) != 1:
             asked = "no group is named" if group is None else f"group = {group}"
-            there = ", ".join(map(str, groups))
+            there = ", ".join(map(str, sorted(set(groups))))
+            if len(found) > 1 and len({place[0] for place in found}) == 1:
+                full = [self._mdf.groups[one].channels[k].name for one, k in found]
+                advice = "name one of them in full" if len(set(full)) > 1 else "rename one of them in the file"
+                raise InputError(f"{what}: is {len(found)} times in group {found[0][0]} ({', '.join(full)}); {advice}.")
             raise InputError(f"{what}: {asked}, but it is in {there}; give one of them as `group` in the channel map.")
         self._check_master(found[0][0], what)
         try:
             signal = self._mdf.get(name, *found[0])
             if signal.samples.dtype.kind in "SUO" and signal.conversion is None:
                 raw = self._mdf.get(name, *found[0], raw=True)
-                signal = raw if raw.conversion is not None else signal
+                signal = _of_words(raw) if raw.conversion is not None else signal
         except Exception as error:  # asammdf raises any kind of error for a damaged block
             raise InputError(f"{what}: cannot be read ({error}). Is the file damaged?") from error
         time = np.asarray(signal.timestamps, dtype=np.float64)
@@ -67,6 +73,17 @@ class MdfLog(Log):
             raise InputError(f"{what}: its group {group} has no time channel. Leave the channel out.")
         if getattr(self._mdf.groups[group].channels[master], "sync_type", 1) not in _TIME_SYNC:
             raise InputError(f"{what}: its group {group} is not recorded over time. Leave the channel out.")
+
+
+def _of_words(raw: Any) -> Any:
+    """Return a signal whose samples are all words: as its raw numbers, or missing if its other values are measurements.
+
+    `SNA` at 255 is no measurement in a channel that is linear elsewhere; `off` and `on` at 0 and 1 are their numbers.
+    """
+    parts = (raw.conversion.referenced_blocks or {}).values()
+    if any(hasattr(part, "conversion_type") for part in parts):
+        raw.samples = np.full(raw.samples.shape, np.nan)
+    return raw
 
 
 def open_mdf(path: Path, channels: ChannelMap | None) -> MdfLog:

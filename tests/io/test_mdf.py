@@ -100,6 +100,50 @@ def test_words_stay_their_numbers_and_text_raises(tmp_path):
         io.read_recording(path)
 
 
+LINEAR = {"a": 0.5, "b": -1.0}
+MEASURED_OR_WORDS = {
+    "a value for each word": {"val_0": 255, "text_0": b"SNA", "val_1": 254, "text_1": b"error", "default_addr": LINEAR},
+    "a range of words": {"lower_0": 254, "upper_0": 255, "text_0": b"SNA", "default_addr": LINEAR},
+    "a range of numbers": {
+        **{"lower_0": 0, "upper_0": 253, "text_0": LINEAR, "lower_1": 254, "upper_1": 255, "text_1": b"SNA"},
+        "default_addr": b"?",
+    },
+}
+
+
+@pytest.mark.parametrize("raw", [[0, 2, 255, 4], [255, 254, 255, 255], [0, 2, 3, 4]])
+@pytest.mark.parametrize("kind", MEASURED_OR_WORDS)
+def test_words_among_measurements_are_missing(tmp_path, kind, raw):
+    time, raw = np.arange(4.0), np.array(raw, np.uint8)
+    path = write(tmp_path / "log.mf4", [signal("v_x", time, raw, unit="m/s", conversion=MEASURED_OR_WORDS[kind])])
+    expected = np.where(raw >= 254, np.nan, 0.5 * raw - 1.0)
+    np.testing.assert_array_equal(io.read_recording(path)["v_x"], expected)
+
+
+@pytest.mark.parametrize("split", [False, True])
+def test_the_same_name_of_two_devices(tmp_path, split):
+    time = [0.0, 1.0]
+    one, other = signal("yaw\\ETKC:1", time, [1.0, 2.0]), signal("yaw\\CAN:2", time, [3.0, 4.0])
+    path = write(tmp_path / "log.mf4", *([[one], [other]] if split else [[one, other]]))
+    recording = io.read_recording(path)
+    assert recording.names == ("yaw\\ETKC:1", "yaw\\CAN:2")
+    chosen = io.read_recording(path, io.ChannelMap({"yaw_rate": "yaw\\CAN:2"}))
+    np.testing.assert_array_equal(chosen["yaw_rate"], [3.0, 4.0])
+    told = (
+        r"is in 0, 1; give one"
+        if split
+        else r"is 2 times in group 0 \(yaw\\ETKC:1, yaw\\CAN:2\); name one of them in full"
+    )
+    with pytest.raises(InputError, match=told):
+        io.read_recording(path, io.ChannelMap({"yaw_rate": "yaw"}))
+
+
+def test_a_name_that_is_twice_in_one_group(tmp_path):
+    path = write(tmp_path / "log.mf4", [signal("v_x", [0.0, 1.0], [1.0, 2.0]), signal("v_x", [0.0, 1.0], [3.0, 4.0])])
+    with pytest.raises(InputError, match=r"channel 'v_x': is 2 times in group 0 .*; rename one of them in the file"):
+        io.read_recording(path)
+
+
 def test_time_that_repeats_within_a_group(tmp_path):
     path = write(tmp_path / "log.mf4", [signal("v_x", [0.0, 1.0, 1.0], [1.0, 2.0, 3.0])])
     with pytest.raises(InputError, match=r"channel 'v_x': time\[2\] = 1.0 after time\[1\] = 1.0: must be strictly"):
