@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.names import check_names
 from jaxveh._core.result import Result, code
-from jaxveh.filters.outer_belief import AbstractTransparentBelief
+from jaxveh.filters.outer_belief import AbstractTransparentBelief, either
 from jaxveh.statespace import AbstractFilter, AbstractWrapper, Gradient, Info, Row, StateSpace, kit
 
 
@@ -109,7 +109,7 @@ class Delayed(AbstractWrapper):
             inside, said = carry
             row, real = given
             after, info = self.inner._step(model, inside, row)
-            inside, more = _choose(real, (after, info.log_likelihood), (inside, jnp.zeros_like(said)))
+            inside, more = either(real, (after, info.log_likelihood), (inside, jnp.zeros_like(said)))
             new = real & ((row.t == newest) | _among(row.t, times))
             return (inside, said + more), (_bare(info), real, new)
 
@@ -166,10 +166,6 @@ def _among(t: Any, times: list) -> Any:
     for other in times:
         found = found | (t == other)
     return found
-
-
-def _choose(condition: Any, a: Any, b: Any) -> Any:
-    return jax.tree.map(lambda x, y: jnp.where(condition, x, y), a, b)
 
 
 def _merge_info(every_info: Info, real: Any, new: Any) -> Info:

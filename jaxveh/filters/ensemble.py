@@ -11,7 +11,13 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import check_whole
 from jaxveh._core.result import Result, code
-from jaxveh.filters.gaussian.filter import check_covariances, innovation_info, unwrap, wrapped_innovation
+from jaxveh.filters.gaussian.filter import (
+    check_covariances,
+    innovation_info,
+    measurements_of,
+    unwrap,
+    wrapped_innovation,
+)
 from jaxveh.filters.gaussian.forms import masked_factor
 from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import times
@@ -112,8 +118,7 @@ class Ensemble(AbstractTwoPartFilter):
 
     def update(self, model: StateSpace, belief: EnsembleBelief, row: Row) -> tuple[EnsembleBelief, Info]:
         """The belief after the row's measurement, at the belief's own time."""
-        measured, present = kit.presence(model, row)
-        here = jnp.stack([present[name] for name in model.channels])
+        given, here = measurements_of(model, row)
         observed = model.observation(row.t, belief.members, row.u)
         rows = [jnp.broadcast_to(getattr(observed, name), belief.members[0].shape) for name in model.channels]
         rows = [unwrap(model, name, values) for name, values in zip(model.channels, rows, strict=True)]
@@ -125,7 +130,6 @@ class Ensemble(AbstractTwoPartFilter):
         factor = numerics.cholesky(times(E, E.T) + times(noise, noise.T))
         # P H^T S^-1, as the transpose of S^-1 (E X^T).
         gain = numerics.solve_psd(factor, times(E, X.T)).T
-        given = jnp.stack([measured[name] for name in model.channels])
         innovation = wrapped_innovation(model, given - jnp.mean(predicted, axis=1), here)
         if self.perturbed:
             _, draw = jax.random.split(jax.random.fold_in(belief.key, belief.count))

@@ -14,7 +14,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.names import as_names, check_names, record
 from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, log_chosen, log_of
-from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, wrapped_innovation
+from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, measurements_of, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.linear import concrete_values
 from jaxveh.filters.gaussian.noises import covariance_in
@@ -120,9 +120,7 @@ class Cloud(AbstractAhead):
 
     def update(self, filter_: Any, model, row):
         linear, prior = filter_.linear, self.prior
-        measured, present = kit.presence(model, row)
-        here = jnp.stack([present[name] for name in model.channels])
-        given = jnp.stack([measured[name] for name in model.channels])
+        given, here = measurements_of(model, row)
 
         def see(point, P):
             observe = lambda x: [getattr(model.observation(row.t, x, row.u), name) for name in model.channels]

@@ -3,6 +3,8 @@
 from typing import Any
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 
 from jaxveh.statespace import AbstractBelief
 
@@ -52,3 +54,8 @@ class AbstractTransparentBelief(AbstractOuterBelief):
 
     def moments(self, model):
         return self.inside.moments(model)
+
+
+def either(condition: Any, a: Any, b: Any) -> Any:
+    """The belief `a` where the condition is true, otherwise `b`."""
+    return jax.tree.map(lambda x, y: jnp.where(condition, x, y), a, b)

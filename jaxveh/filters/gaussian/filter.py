@@ -176,9 +176,7 @@ def correct(
     form: AbstractForm, model: StateSpace, belief: GaussianBelief, row: Row, image: Image
 ) -> tuple[GaussianBelief, Info]:
     """The belief after a row and its info, where `image` is that of the belief under the observation."""
-    measured, present = kit.presence(model, row)
-    here = jnp.stack([present[name] for name in model.channels])
-    given = jnp.stack([measured[name] for name in model.channels])
+    given, here = measurements_of(model, row)
     innovation = wrapped_innovation(model, given - image.mean, here)
     before = Spread(belief.factor, belief.matrix)
     law = law_at(model, row, lambda: belief.mean)
@@ -267,6 +265,13 @@ def unwrap(model: StateSpace, name: str, values: Any) -> Any:
     if name not in model.angles or not values.ndim:
         return values
     return values[0] + numerics.wrap_angle(values - values[0])
+
+
+def measurements_of(model: StateSpace, row: Row) -> tuple[Any, Any]:
+    """The measurements (m,) of a row, zero where missing, and which of them are there (m,)."""
+    values, present = kit.presence(model, row)
+    stacked = lambda by_name: jnp.stack([by_name[name] for name in model.channels])
+    return stacked(values), stacked(present)
 
 
 def wrapped_innovation(model: StateSpace, innovation: Any, here: Any) -> Any:

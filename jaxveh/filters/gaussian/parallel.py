@@ -93,12 +93,15 @@ def _presence(model, row, complete: bool):
     return values, dict.fromkeys(present, jnp.asarray(True)) if complete else present
 
 
+def gaussian_at(model: StateSpace, rule: AbstractRule, row: Row, mean: Any, covariance: Any) -> GaussianBelief:
+    """The belief of this mean (n,) and covariance (n, n) at a row."""
+    factor = numerics.cholesky(covariance)
+    return GaussianBelief(mean, factor, covariance, row.t, row.u, jnp.int32(0), type(model.prior.mean), rule)
+
+
 def _lines(rule, model, rows: Row, means, covariances, complete) -> tuple[Lines, Lines]:
     """The lines of the transitions (T - 1), whose errors include the process noise, and those of the observations (T)."""
-
-    def belief(row, mean, covariance):
-        factor = numerics.cholesky(covariance)
-        return GaussianBelief(mean, factor, covariance, row.t, row.u, jnp.int32(0), type(model.prior.mean), rule)
+    belief = lambda row, mean, covariance: gaussian_at(model, rule, row, mean, covariance)
 
     def move(row, t, u, mean, covariance):
         now = belief(row, mean, covariance)

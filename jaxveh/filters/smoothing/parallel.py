@@ -12,8 +12,7 @@ from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import first_failure
 from jaxveh.filters.gaussian import AbstractGaussianFilter
-from jaxveh.filters.gaussian.belief import GaussianBelief
-from jaxveh.filters.gaussian.parallel import info_of, pass_over
+from jaxveh.filters.gaussian.parallel import gaussian_at, info_of, pass_over
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.statespace import Estimate, Row, Smoothing, StateSpace, kit, parameters_of
 
@@ -85,7 +84,7 @@ def _smooth_rows(filter, model, rows: Row, complete: bool = False) -> SmoothedEs
     path, _ = jax.lax.scan(jax.checkpoint(again), path, length=max(filter.linearisations - 1, 0))
     passed = pass_over(rule, model, rows, *path, complete=complete)
     info = info_of(model, rows, passed, complete=complete)
-    beliefs = lambda gaussians: jax.vmap(lambda row, m, P: _belief(model, rule, row, m, P))(rows, *gaussians)
+    beliefs = lambda gaussians: jax.vmap(lambda row, m, P: gaussian_at(model, rule, row, m, P))(rows, *gaussians)
     filtered, smoothed = beliefs(passed.filtered), beliefs(passed.smoothed)
     moments = jax.vmap(lambda belief: belief.moments(model))
     mean, std = moments(filtered)
@@ -95,8 +94,3 @@ def _smooth_rows(filter, model, rows: Row, complete: bool = False) -> SmoothedEs
     total = jnp.sum(info.log_likelihood)
     estimate = Estimate(rows.t, mean, std, total, info, result, failed_at, last, show(mean), show(std))
     return smoothed_estimate(model, estimate, moments(smoothed))
-
-
-def _belief(model, rule, row: Row, mean, covariance) -> GaussianBelief:
-    factor = numerics.cholesky(covariance)
-    return GaussianBelief(mean, factor, covariance, row.t, row.u, jnp.int32(0), type(model.prior.mean), rule)

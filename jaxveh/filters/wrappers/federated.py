@@ -17,7 +17,7 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import times
-from jaxveh.filters.outer_belief import AbstractTransparentBelief
+from jaxveh.filters.outer_belief import AbstractTransparentBelief, either
 from jaxveh.statespace import AbstractProcessNoise, AbstractWrapper, Gradient, Row, StateSpace
 
 
@@ -149,7 +149,7 @@ class Federated(AbstractWrapper):
         trusted = jnp.ones(len(self.groups), bool) if self.isolate is None else alarm < self.isolate
         # If all local filters are suspect, none can be judged by the others, and all are used.
         trusted = trusted | ~jnp.any(trusted)
-        believed = jax.vmap(_either)(trusted, found, ahead)
+        believed = jax.vmap(either)(trusted, found, ahead)
         master = self._fuse(believed, belief.inside, predicted if self.common else None)
         master = with_spread(
             master, master.vector, Spread(master.factor, master.matrix), row.t, row.u, belief.count + 1
@@ -205,10 +205,6 @@ def _only(model: StateSpace, row: Row, group: tuple[str, ...]) -> Row:
 def _count(row: Row, group: tuple[str, ...]) -> Any:
     here = [jnp.isfinite(getattr(row.y, name)) for name in group]
     return jnp.sum(jnp.stack(here).astype(row.t.dtype))
-
-
-def _either(condition, a: GaussianBelief, b: GaussianBelief) -> GaussianBelief:
-    return jax.tree.map(lambda x, y: jnp.where(condition, x, y), a, b)
 
 
 class _Shared(AbstractProcessNoise):

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innovation
+from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, measurements_of, wrapped_innovation
 from jaxveh.filters.gaussian.noises import covariance_in, law_at
 from jaxveh.filters.gaussian.rules import spread_of
-from jaxveh.statespace import Row, StateSpace, kit
+from jaxveh.statespace import Row, StateSpace
 
 
 class Innovation(NamedTuple):
@@ -25,9 +25,8 @@ class Innovation(NamedTuple):
 def innovation(filter: AbstractGaussianFilter, model: StateSpace, belief: Any, row: Row) -> Innovation:
     """The innovation of `row` under the belief before it."""
     image = filter.observe(model, belief, row)
-    measured, present = kit.presence(model, row)
-    here = jnp.stack([present[name] for name in model.channels])
-    error = jnp.stack([measured[name] for name in model.channels]) - image.mean
+    given, here = measurements_of(model, row)
+    error = given - image.mean
     own = filter.adapted_model(model, belief)
     law = law_at(own, row, lambda: belief.mean)
     noise = jnp.diagonal(covariance_in(law, model.channels, error.dtype))

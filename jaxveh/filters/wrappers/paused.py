@@ -13,6 +13,7 @@ from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.forms import Spread
+from jaxveh.filters.outer_belief import either
 from jaxveh.filters.wrappers.base import gaussian_of, with_gaussian
 from jaxveh.statespace import AbstractWrapper, Gradient, StateSpace, kit
 
@@ -56,15 +57,15 @@ class Paused(AbstractWrapper):
     def _init(self, model, row, key):
         prior = self.inner.prior(model, row)
         after, info = self.inner.update(model, prior, self._silent(model, row))
-        return _choose(self._waits(row.u), _after(prior, row), after), info
+        return either(self._waits(row.u), _after(prior, row), after), info
 
     def _step(self, model, belief, row):
         waits, waited = self._waits(row.u), self._waits(belief.u)
         ahead = self.inner.predict_between(model, belief, row.t, row.u)
-        here = _choose(waits, belief, self._widen(model, belief))
-        start = _choose(waited, _at(here, t=row.t), ahead)
+        here = either(waits, belief, self._widen(model, belief))
+        start = either(waited, _at(here, t=row.t), ahead)
         after, info = self.inner.update(model, start, self._silent(model, row))
-        return _choose(waits, _after(start, row), after), info
+        return either(waits, _after(start, row), after), info
 
     def _waits(self, u):
         return getattr(u, self.channel) > 0.5
@@ -90,7 +91,3 @@ def _at(belief: Any, **where: Any) -> Any:
 def _after(belief: Any, row: Any) -> Any:
     """The belief after a row without an update."""
     return _at(belief, t=row.t, u=row.u, count=gaussian_of(belief).count + 1)
-
-
-def _choose(condition: Any, a: Any, b: Any) -> Any:
-    return jax.tree.map(lambda x, y: jnp.where(condition, x, y), a, b)

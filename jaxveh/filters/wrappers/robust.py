@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import check_positive, check_whole
-from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innovation
+from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, measurements_of, wrapped_innovation
 from jaxveh.filters.gaussian.rules import spread_of
 from jaxveh.filters.gaussian.wrapper import AbstractStateless
 from jaxveh.filters.wrappers.base import (
@@ -94,7 +94,5 @@ class RobustStudentT(AbstractReweighting):
 def expected_squares(filter: AbstractGaussianFilter, model: Any, belief: Any, row: Any) -> Any:
     """E[(y - h)^2] (m,) under a belief after the row: the squared residual plus the belief's variance of h."""
     image = filter.observe(model, belief, row)
-    measured, present = kit.presence(model, row)
-    here = jnp.stack([present[name] for name in model.channels])
-    residual = jnp.stack([measured[name] for name in model.channels]) - image.mean
-    return jnp.square(wrapped_innovation(model, residual, here)) + spread_of(image)
+    given, here = measurements_of(model, row)
+    return jnp.square(wrapped_innovation(model, given - image.mean, here)) + spread_of(image)
