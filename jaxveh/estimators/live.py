@@ -147,7 +147,7 @@ class Live(eqx.Module):
 def live_init(live: Live, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
     """The compiled part of `Live.init`, for a row's time and channels as scalars."""
     memory, values = apart(live.cleaning.first, row[0], *row)
-    cleaned = _cleaned(live.model, row[0], values)
+    cleaned = row_of(live.model, row[0], values)
     belief, info = live.filter.init(live.model, cleaned, live.key)
     begin = lambda model: live.filter.init(model, cleaned, live.key)[0]
     others = None if live.members is None else eqx.filter_vmap(begin)(live.members.models)
@@ -158,7 +158,7 @@ def live_init(live: Live, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
 def live_step(live: Live, before: LiveBelief, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
     """The compiled part of `Live.step`, for a row's time and channels as scalars."""
     memory, values = apart(live.cleaning.next, row[0], before.memory, *row)
-    cleaned = _cleaned(live.model, row[0], values)
+    cleaned = row_of(live.model, row[0], values)
     belief, info = live.filter.step(live.model, before.belief, cleaned)
     go_on = lambda model, belief: live.filter.step(model, belief, cleaned)[0]
     others = None if live.members is None else eqx.filter_vmap(go_on)(live.members.models, before.members)
@@ -173,6 +173,7 @@ def _answer(live: Live, belief, others, info: Info) -> LiveAnswer:
     return LiveAnswer(mean, std, info)
 
 
-def _cleaned(model: StateSpace, t, values: dict[str, Any]) -> Row:
+def row_of(model: StateSpace, t, values: dict[str, Any]) -> Row:
+    """The model's row of a time (s) and values by channel."""
     of = lambda kind, names: record(kind, {name: values[name] for name in names})
     return Row(t, of("Inputs", model.inputs), of("Measurements", model.channels))

@@ -28,11 +28,11 @@ from jaxveh._core.estimated import Estimated
 from jaxveh._core.names import record
 from jaxveh._core.result import Result, code
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.live import AbstractCleaning, AsItIs
+from jaxveh.estimators.live import AbstractCleaning, AsItIs, row_of
 from jaxveh.io import CarSpecification
 from jaxveh.io import kit as io
 from jaxveh.numerics import apart
-from jaxveh.statespace import AbstractFilter, Row, StateSpace, kit
+from jaxveh.statespace import AbstractFilter, StateSpace, kit
 
 
 class Answer(NamedTuple):
@@ -145,20 +145,16 @@ class Filtered(AbstractMethod):
 
     def first(self, t, values):
         memory, cleaned = self.cleaning.first(t, values)
-        row = self._row(t, cleaned)
+        row = row_of(self.model, t, cleaned)
         belief, info = self.filter.init(self.model, row, self.key)
         return (belief, memory), self._answer(belief, row, info)
 
     def next(self, memory, t, values):
         belief, memory = memory
         memory, cleaned = self.cleaning.next(memory, t, values)
-        row = self._row(t, cleaned)
+        row = row_of(self.model, t, cleaned)
         belief, info = self.filter.step(self.model, belief, row)
         return (belief, memory), self._answer(belief, row, info)
-
-    def _row(self, t, values) -> Row:
-        of = lambda kind, names: record(kind, {name: values[name] for name in names})
-        return Row(t, of("Inputs", self.model.inputs), of("Measurements", self.model.channels))
 
     def _answer(self, belief, row, info) -> Answer:
         mean, std = belief.moments(self.model)

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.names import record
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.live import row_of
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.navigation.cleaning import Cleaning, Felt
 from jaxveh.estimators.navigation.observed import ANGLES, channels_of, noise, observation, report
@@ -92,13 +92,13 @@ class Navigation(AbstractMethod):
 
     def first(self, t, values):
         felt, cleaned = self._cleaning.first(t, values)
-        row = self._row(t, cleaned)
+        row = row_of(self.model, t, cleaned)
         belief = self.filter.prior(self.model, row)
         return self._said(belief, felt, jnp.zeros_like(t, bool), row, cleaned, jnp.int32(0))
 
     def next(self, memory: Known, t, values):
         felt, cleaned = self._cleaning.next(memory.felt, t, values)
-        row = self._row(t, cleaned)
+        row = row_of(self.model, t, cleaned)
         after, info = self.filter.step(self.model, memory.belief, row)
         goes_on = memory.begun & cleaned["felt"]
         held = dataclasses.replace(memory.belief, t=row.t, u=row.u)
@@ -140,10 +140,6 @@ class Navigation(AbstractMethod):
         covariance = covariance.at[place, place].set(both / jnp.square(speed) + fixed)
         covariance = covariance.at[place, slip].set(-both / speed).at[slip, place].set(-both / speed)
         return kit.with_spread(belief, mean, self.filter.form.start(covariance), t=row.t, u=row.u)
-
-    def _row(self, t, cleaned) -> Row:
-        of = lambda kind, names: record(kind, {name: cleaned[name] for name in names})
-        return Row(t, of("Inputs", self.model.inputs), of("Measurements", self.model.channels))
 
 
 def _choose(condition, one, other):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -58,6 +59,14 @@ class AbstractFusion(AbstractMethod):
 
     inner: AbstractMethod
 
+    def __check_init__(self):
+        check_parameters(self)
+
+    @abc.abstractmethod
+    def fuse(self, memory: FusionMemory, dt: Any, rate: Any, model: Any, values: dict[str, Any]) -> tuple[Any, Any]:
+        """`v_y` (m/s) of a row, `dt` (s) after the last one, and the slow part of the rate: from the `rate` (m/s^2) and the
+        dynamic estimate, `model` (m/s)."""
+
     @property
     def needs(self):
         return joined_needs(self.inner)
@@ -66,6 +75,12 @@ class AbstractFusion(AbstractMethod):
         inner, said = self.inner.first(t, values)
         v_y, rate = said.mean.v_y, self._rate(values, jnp.zeros_like(t))
         return FusionMemory(inner, v_y, rate, rate, v_y, t), sideslip_answer(v_y, values["v_x"], said.known.v_y)
+
+    def next(self, memory, t, values):
+        inner, said = self.inner.next(memory.inner, t, values)
+        rate, model = self._rate(values, memory.rate), said.mean.v_y
+        v_y, slow = self.fuse(memory, t - memory.t, rate, model, values)
+        return FusionMemory(inner, v_y, rate, slow, model, t), sideslip_answer(v_y, values["v_x"], said.known.v_y)
 
     def _rate(self, values, before):
         """The rate of v_y, m/s^2; that of the previous row, `before`, where a measurement is missing."""
@@ -87,15 +102,10 @@ class PseudoIntegration(AbstractFusion):
 
     time: jax.Array = positive("s", default=PSEUDO_TIME)
 
-    def __check_init__(self):
-        check_parameters(self)
-
-    def next(self, memory, t, values):
-        inner, said = self.inner.next(memory.inner, t, values)
-        rate, model, kept = self._rate(values, memory.rate), said.mean.v_y, jnp.exp(-(t - memory.t) / self.time)
+    def fuse(self, memory, dt, rate, model, values):
+        kept = jnp.exp(-dt / self.time)
         towards = 0.5 * (memory.rate + rate) * self.time + 0.5 * (memory.model + model)
-        v_y = kept * memory.v_y + (1.0 - kept) * towards
-        return FusionMemory(inner, v_y, rate, rate, model, t), sideslip_answer(v_y, values["v_x"], said.known.v_y)
+        return kept * memory.v_y + (1.0 - kept) * towards, rate
 
 
 class Switched(AbstractFusion):
@@ -113,24 +123,18 @@ class Switched(AbstractFusion):
     banked: jax.Array = positive("m/s^2", default=BANKED)
     bank_time: jax.Array = positive("s", default=BANK_TIME)
 
-    def __check_init__(self):
-        check_parameters(self)
-
     @property
     def needs(self):
         return joined_needs(self.inner, self.steady)
 
-    def next(self, memory, t, values):
-        inner, said = self.inner.next(memory.inner, t, values)
-        dt, rate, a_y = t - memory.t, self._rate(values, memory.rate), values["a_y"]
+    def fuse(self, memory, dt, rate, model, values):
+        a_y = values["a_y"]
         slow = memory.slow + (1.0 - jnp.exp(-dt / self.bank_time)) * (rate - memory.slow)
         asked = self.steady.asked_acceleration(values["v_x"], values["steer"])
         distrusted = (jnp.abs(a_y) > self.hard) | (jnp.abs(asked) - jnp.abs(a_y) > self.slippery)
         integrates = distrusted & (jnp.abs(slow) <= self.banked)
         integral = memory.v_y + 0.5 * dt * (memory.rate + rate)
-        v_y = jnp.where(integrates, integral, said.mean.v_y)
-        after = FusionMemory(inner, v_y, rate, slow, said.mean.v_y, t)
-        return after, sideslip_answer(v_y, values["v_x"], said.known.v_y)
+        return jnp.where(integrates, integral, model), slow
 
 
 class Fuzzy(AbstractFusion):
@@ -150,19 +154,14 @@ class Fuzzy(AbstractFusion):
     quick: tuple[float, float] = eqx.field(static=True, default=(0.5, 2.0))
     banked: tuple[float, float] = eqx.field(static=True, default=(0.3, 0.7))
 
-    def __check_init__(self):
-        check_parameters(self)
-
-    def next(self, memory, t, values):
-        inner, said = self.inner.next(memory.inner, t, values)
-        dt, rate, model, a_y = t - memory.t, self._rate(values, memory.rate), said.mean.v_y, values["a_y"]
+    def fuse(self, memory, dt, rate, model, values):
+        a_y = values["a_y"]
         slow = memory.slow + (1.0 - jnp.exp(-dt / self.bank_time)) * (rate - memory.slow)
         worked = large(jnp.where(jnp.isnan(a_y), 0.0, a_y), *self.hard)
         integrates = (1.0 - (1.0 - worked) * (1.0 - large(rate, *self.quick))) * (1.0 - large(slow, *self.banked))
         integral = memory.v_y + 0.5 * dt * (memory.rate + rate)
         pulled = 1.0 - jnp.exp(-(1.0 - integrates) * dt / self.time)
-        v_y = integral + pulled * (model - integral)
-        return FusionMemory(inner, v_y, rate, slow, model, t), sideslip_answer(v_y, values["v_x"], said.known.v_y)
+        return integral + pulled * (model - integral), slow
 
 
 class Weighted(AbstractMethod):
