@@ -10,7 +10,8 @@ import typer
 from jaxveh import InputError
 
 LOG_HELP = (
-    "The log: .csv, .parquet, .nc, .mf4, .mdf, .mat or .mcap, with a time column and channels (jaxveh schema channels)."
+    "The log: .csv (.txt, .tsv, .dat), .parquet, .nc, .mf4, .mdf, .mat or .mcap, with a time column and channels (jaxveh schema "
+    "channels)."
 )
 
 Log = Annotated[Path, typer.Argument(metavar="LOG", help=LOG_HELP, show_default=False)]

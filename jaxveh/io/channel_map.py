@@ -22,13 +22,16 @@ sign = -1                   # 1 or -1: axes are x forward, y left, z up; turns t
 scale = 1.0                 # the value is sign * (scale * column + offset), in `unit`
 offset = 0.0
 group = 3                   # MDF4 only: the channel group, if several have a column of this name
+time = "Time_2"             # CSV and Parquet only: its own time column, if the columns do not share one; or with unit, as above
 
-[channels]
+[channels]                  # without any channel, every column is one with its own name
 v_x = "Speed"               # short for { column = "Speed" }
 
-[csv]                       # CSV only
-separator = ";"             # default: the most frequent of , ; and tab in the header line
-decimal = ","               # default: a point
+[csv]                       # text only; what is not given here is found in the file
+separator = ";"             # one character; " " for any number of blanks
+decimal = ","               # or "."
+names_line = 15             # the number of the line with the names of the columns
+encoding = "utf-8"          # or "cp1252", "utf-16-le", ...
 """
 """The file's schema as a commented example, for programs to print."""
 
@@ -37,7 +40,10 @@ MOST_GROUPS = 2**31
 
 @dataclass(frozen=True)
 class Channel:
-    """The column of a channel in a file: its value is `sign * (scale * column + offset)` in `unit` (None: the file's)."""
+    """The column of a channel in a file: its value is `sign * (scale * column + offset)` in `unit` (None: the file's).
+
+    `time`: the column of its time stamps in a CSV or Parquet file (a string is short for `Channel(column)`), None for the log's.
+    """
 
     column: str
     unit: str | None = None
@@ -45,8 +51,11 @@ class Channel:
     scale: float = 1.0
     offset: float = 0.0
     group: int | None = None
+    time: Channel | None = None
 
     def __post_init__(self):
+        if isinstance(self.time, str):
+            object.__setattr__(self, "time", Channel(self.time))
         check_one_of("sign", self.sign, (1, -1))
         check("scale", self.scale, lambda v: (v != 0) & (abs(v) < float("inf")), "finite and not zero")
         check_finite("offset", self.offset)
@@ -56,24 +65,41 @@ class Channel:
 class ChannelMap:
     """The columns to read from a log, by channel name; see `channel_map.CHANNEL_MAP_SCHEMA` for the file.
 
-    `channels`: name to `Channel` (a string is short for `Channel(column)`); `time`: the time column, None for the usual
-    names; `separator`, `decimal`: of a CSV file; `source`: the origin of the map, for messages.
+    `channels`: name to `Channel` (a string is short for `Channel(column)`); without any, every column is a channel with its own
+    name. `time`: the time column, None for the usual names. Of a text file: `separator` (a blank for any number of blanks),
+    `decimal`, `names_line` (the number of the line with the names, from 1) and `encoding`; None for what the file shows.
+    `source`: the origin of the map, for messages.
     """
 
-    channels: Mapping[str, Channel]
+    channels: Mapping[str, Channel] = field(default_factory=dict)
     time: Channel | None = None
     separator: str | None = None
-    decimal: str = "."
+    decimal: str | None = None
+    names_line: int | None = None
+    encoding: str | None = None
     source: str = field(default="channel map", compare=False)
 
     def __post_init__(self):
         object.__setattr__(self, "channels", {name: _channel(entry) for name, entry in self.channels.items()})
         object.__setattr__(self, "time", None if self.time is None else _channel(self.time))
-        if not self.channels:
+        told = (self.time, self.separator, self.decimal, self.names_line, self.encoding)
+        if not self.channels and all(one is None for one in told):
             raise InputError(f"{self.source}: has no channel; add a table [channels.NAME] with its column.")
-        check_one_of(f"{self.source}: decimal", self.decimal, (".", ","))
+        if self.decimal is not None:
+            check_one_of(f"{self.source}: decimal", self.decimal, (".", ","))
         if self.separator is not None and len(self.separator) != 1:
             raise InputError(f"{self.source}: separator = {self.separator!r}: must be one character.")
+        if self.separator is not None and self.separator == self.decimal:
+            raise InputError(f"{self.source}: separator and decimal are both {self.decimal!r}; they must differ.")
+        if self.names_line is not None and self.names_line < 1:
+            raise InputError(f"{self.source}: names_line = {self.names_line}: must be the number of a line, from 1.")
+        if self.encoding is not None:
+            _check_encoding(self.encoding, self.source)
+
+    @property
+    def shares_time(self) -> bool:
+        """Whether some channel has no time column of its own."""
+        return not self.channels or any(one.time is None for one in self.channels.values())
 
 
 def read_channel_map(path: str | os.PathLike) -> ChannelMap:
@@ -86,15 +112,15 @@ def read_channel_map(path: str | os.PathLike) -> ChannelMap:
     content = read_toml(path)
     check_keys(str(path), content, ("time", "channels", "csv"))
     csv = content.get("csv", {})
-    check_keys(f"{path}: [csv]", csv, ("separator", "decimal"))
+    check_keys(f"{path}: [csv]", csv, ("separator", "decimal", "names_line", "encoding"))
     channels = content.get("channels", {})
     if not isinstance(channels, Mapping):
         raise InputError(f"{path}: channels = {channels!r}: must be tables [channels.NAME].")
     return ChannelMap(
         channels={name: _entry(f"{path}: [channels.{name}]", entry) for name, entry in channels.items()},
         time=_entry(f"{path}: time", content["time"]) if "time" in content else None,
-        separator=toml_text(f"{path}: separator", csv["separator"]) if "separator" in csv else None,
-        decimal=toml_text(f"{path}: decimal", csv.get("decimal", ".")),
+        **{key: toml_text(f"{path}: {key}", csv[key]) for key in ("separator", "decimal", "encoding") if key in csv},
+        names_line=_whole(f"{path}: names_line", csv["names_line"], 1) if "names_line" in csv else None,
         source=str(path),
     )
 
@@ -106,12 +132,9 @@ def _channel(entry: Channel | str) -> Channel:
 def _entry(where: str, entry: Any) -> Channel:
     if isinstance(entry, str):
         return Channel(entry)
-    check_keys(where, entry, ("column", "unit", "sign", "scale", "offset", "group"))
+    check_keys(where, entry, ("column", "unit", "sign", "scale", "offset", "group", "time"))
     if "column" not in entry:
         raise InputError(f'{where}: has no `column`; add column = "NAME IN THE FILE".')
-    group = entry.get("group")
-    if group is not None and (isinstance(group, bool) or not isinstance(group, int) or not 0 <= group < MOST_GROUPS):
-        raise InputError(f"{where}: group = {shorten(group)}: must be a whole number from 0 to {MOST_GROUPS - 1}.")
     try:
         return Channel(
             column=toml_text(f"{where}: column", entry["column"]),
@@ -119,7 +142,23 @@ def _entry(where: str, entry: Any) -> Channel:
             sign=toml_number(f"{where}: sign", entry.get("sign", 1)),
             scale=toml_number(f"{where}: scale", entry.get("scale", 1.0)),
             offset=toml_number(f"{where}: offset", entry.get("offset", 0.0)),
-            group=group,
+            group=_whole(f"{where}: group", entry["group"], 0) if "group" in entry else None,
+            time=_entry(f"{where}: time", entry["time"]) if "time" in entry else None,
         )
     except InputError as error:
         raise error if str(error).startswith(where) else InputError(f"{where}: {error}") from error
+
+
+def _whole(where: str, value: Any, least: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value < MOST_GROUPS:
+        raise InputError(f"{where} = {shorten(value)}: must be a whole number from {least} to {MOST_GROUPS - 1}.")
+    return value
+
+
+def _check_encoding(encoding: str, source: str) -> None:
+    try:
+        "".encode(encoding)
+    except (LookupError, ValueError) as error:
+        raise InputError(
+            f"{source}: encoding = {encoding!r}: is not known; such as utf-8, cp1252, utf-16-le."
+        ) from error

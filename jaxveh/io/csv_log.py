@@ -2,53 +2,71 @@
 
 from __future__ import annotations
 
-import csv
+import re
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import ChannelMap
-from jaxveh.io.decimals import is_number
+from jaxveh.io.csv_layout import Layout, find_layout
 from jaxveh.io.log import TableLog
 from jaxveh.io.optional import require
 from jaxveh.io.units import is_unit, same_unit
 
-_ENCODING = "utf-8-sig"
+MISSING = ["-", "--", "---", "#NV", "n.a."]
+"""Cells without a value, beside those that pandas knows (empty, `NA`, `NaN`, `null`, `#N/A`, ...)."""
 
 
 def open_csv(path: Path, channels: ChannelMap | None) -> TableLog:
-    """Open a CSV file with one header line; the channel map gives the separator and the decimal sign.
+    """Open a text file with columns: names, perhaps a line of units, and rows; see `csv_layout.find_layout`.
 
-    Without a map the separator is the most frequent of `,`, `;` and tab in the header line, and the decimal sign is a point.
+    The channel map gives what is not to be searched for. What was assumed is told in a `JaxvehWarning`.
     """
-    headings, separator = _header(path, channels.separator if channels else None)
-    columns = _columns(path, headings, separator, channels.decimal if channels else ".")
-    return TableLog(path, tuple(columns), columns.__getitem__, {}, "", channels.time if channels else None)
+    table = read_columns(path, channels)
+    return TableLog(path, table.headings, table.cells.__getitem__, table.units, "", channels, table.point)
 
 
-def read_columns(path: Path) -> dict[str, Any]:
-    """Return the cells of each column, by heading, of a CSV file with one header line; it needs no time column."""
-    headings, separator = _header(path, None)
-    return _columns(path, headings, separator, ".")
+class TextTable(NamedTuple):
+    """The columns of a text file: `headings`, `cells` by heading, `units` of a line of units by heading, the decimal `point`."""
+
+    headings: list[str]
+    cells: dict[str, Any]
+    units: dict[str, str]
+    point: str
+
+
+def read_columns(path: Path, told: ChannelMap | None = None) -> TextTable:
+    """Return the columns of a text file; it needs no time column. What was assumed is told in a `JaxvehWarning`."""
+    layout = find_layout(path, told)
+    frame = _read(path, layout, "strict")
+    # Spreadsheets write rows of separators alone.
+    frame = frame.dropna(how="all") if frame.iloc[:, 0].isna().any() else frame
+    if frame.empty:
+        raise InputError(f"{path}: the log is empty: it has columns but no row.")
+    if layout.remarks:
+        warnings.warn(f"{path}: {'; '.join(layout.remarks)}.", JaxvehWarning, stacklevel=2)
+    headings = _named(layout.headings, frame)
+    return TextTable(headings, _cells(headings, frame), layout.units, layout.decimal)
 
 
 def read_below(path: Path, headings: list[str], separator: str, lines: int) -> dict[str, Any]:
     """Return the cells of each column, by heading, below `lines` header lines; bytes that are not UTF-8 are replaced."""
-    return _columns(path, headings, separator, ".", lines, "replace")
+    layout = Layout(headings, {}, lines, separator, ".", "utf-8-sig", ())
+    frame = _read(path, layout, "replace")
+    return _cells(_named(headings, frame), frame)
 
 
-def _columns(
-    path: Path, headings: list[str], separator: str, decimal: str, lines: int = 1, errors: str = "strict"
-) -> dict[str, Any]:
-    frame = _read(path, headings, separator, decimal, lines, errors)
-    # A separator at the end of every line makes a last column without a name and without cells.
-    if headings[-1] == "" and frame.iloc[:, -1].isna().all():
-        headings = headings[:-1]
+def _named(headings: list[str], frame: Any) -> list[str]:
+    """Return the headings without a last one that is empty: a separator ends every line."""
+    return headings[:-1] if headings[-1] == "" and frame.iloc[:, -1].isna().all() else headings
+
+
+def _cells(headings: list[str], frame: Any) -> dict[str, Any]:
     return {heading: frame.iloc[:, column].array for column, heading in enumerate(headings)}
 
 
@@ -73,58 +91,45 @@ def write_csv(
     pandas.DataFrame(wide).to_csv(path, index=False, lineterminator="\n", encoding="utf-8")
 
 
-def _header(path: Path, separator: str | None) -> tuple[list[str], str]:
-    try:
-        with path.open(encoding=_ENCODING, newline="") as file:
-            line = file.readline()
-            separator = separator or max(",;\t", key=line.count)
-            file.seek(0)
-            headings = [heading.strip() for heading in next(csv.reader(file, delimiter=separator))]
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8.") from error
-    except csv.Error as error:
-        raise InputError(f"{path}: line 1: {error}.") from error
-    twice = sorted({heading for heading in headings if headings.count(heading) > 1})
-    if twice:
-        raise InputError(f"{path}: several columns are named {', '.join(map(repr, twice))}; rename them.")
-    if all(is_number(heading) for heading in headings):
-        raise InputError(f"{path}: line 1 holds numbers only; the first line must name the columns.")
-    return headings, separator
-
-
 def _exact(version: str) -> dict[str, str]:
     """Return the option that makes pandas read each decimal as its nearest float64; since 3.1 pandas always does."""
     major, minor = map(int, version.split(".")[:2])
     return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}
 
 
-def _read(path: Path, headings: list[str], separator: str, decimal: str, lines: int, errors: str):
+def _read(path: Path, layout: Layout, errors: str):
     pandas = require("pandas", "reading CSV")
+    above = layout.first
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), path.open(encoding=layout.encoding, errors=errors, newline="") as file:
             # Without this, rows longer than the header would lose cells with only a warning.
             warnings.simplefilter("error", pandas.errors.ParserWarning)
+            # pandas itself would search the lines above for quotes.
+            for _ in range(above):
+                file.readline()
             return pandas.read_csv(
-                path,
-                sep=separator,
-                decimal=decimal,
+                file,
+                sep=layout.separator,
+                decimal=layout.decimal,
                 header=None,
-                skiprows=lines,
-                names=range(len(headings)),
+                names=range(len(layout.headings)),
                 index_col=False,
                 skipinitialspace=True,
+                na_values=MISSING,
                 **_exact(pandas.__version__),
                 low_memory=False,
-                encoding=_ENCODING,
-                encoding_errors=errors,
             )
     except pandas.errors.EmptyDataError as error:
         raise InputError(f"{path}: the log is empty: it has columns but no row.") from error
     except pandas.errors.ParserError as error:
-        raise InputError(f"{path}: {str(error).strip()}. Correct the line, or name the separator.") from error
+        words = re.sub(r"(?<=in line )\d+", lambda found: str(int(found[0]) + above), str(error).strip())
+        raise InputError(f"{path}: {words}. Correct the line, or name the separator.") from error
     except pandas.errors.ParserWarning as error:
         raise InputError(
-            f"{path}: rows have more cells than the first line has names ({len(headings)}). Correct the first line."
+            f"{path}: rows have more cells than line {max(above, 1)} has names ({len(layout.headings)}). Correct that line, or "
+            "give `names_line` and `separator` under [csv] in the channel map."
         ) from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8.") from error
+        raise InputError(
+            f"{path}: is not text in {layout.encoding} (byte {error.start}); save it as CSV in UTF-8."
+        ) from error

@@ -15,6 +15,7 @@ from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.log import numeric, split_unit
 from jaxveh.io.optional import require
 from jaxveh.io.recordings import write_columns
+from jaxveh.io.stamps import seconds
 from jaxveh.io.units import convert, is_unit
 
 
@@ -47,8 +48,8 @@ def from_frame(frame: Any) -> Recording:
     """Return the recording of a data frame of `to_frame`, or of any other frame: each column is a channel.
 
     A channel has the float type of its column, in half precision at the least; other types become floats. Time is the column
-    `time`, otherwise the index: numbers are seconds, a `pandas.TimedeltaIndex` becomes seconds, a `pandas.DatetimeIndex` seconds
-    since 1970. Units and note are those of `frame.attrs`; a column's name may be `name [unit]`, and a channel of `io.CANONICAL`
+    `time`, otherwise the index: numbers are seconds, durations become seconds, and dates seconds since 1970. Units and note are
+    those of `frame.attrs`; a column's name may be `name [unit]`, and a channel of `io.CANONICAL`
     is then converted to SI.
 
     **Raises** `InputError` for columns that are not numbers, duplicate names, and time that does not increase.
@@ -63,8 +64,12 @@ def from_frame(frame: Any) -> Recording:
     columns = {
         name: numeric(frame[key].to_numpy(), f"from_frame: column {name!r}")
         for name, key in zip(names, frame, strict=True)
+        if name != "time"
     }
-    time = columns.pop("time") if "time" in columns else _index(frame.index)
+    if "time" in names:
+        time = _time(frame["time"], "from_frame: column 'time'")
+    else:
+        time = _time(frame.index, "from_frame: the index, because there is no column `time`")
     told = frame.attrs.get("units", {})
     plain = {name: (name, told.get(name, "")) if name in told else split_unit(name) for name in columns}
     channels = {}
@@ -80,13 +85,13 @@ def from_frame(frame: Any) -> Recording:
     return Recording(np.asarray(time, np.float64), channels, units, str(frame.attrs.get("source", "")))
 
 
-def _index(index: Any) -> np.ndarray:
-    """Return a frame's index in seconds."""
-    if getattr(index, "tz", None) is not None:
-        index = index.tz_convert(None)
-    if index.dtype.kind in "mM":
-        return index.to_numpy().astype(f"{index.dtype.kind}8[ns]").astype(np.int64) / 1e9
-    return numeric(index.to_numpy(), "from_frame: the index, because there is no column `time`")
+def _time(cells: Any, what: str) -> np.ndarray:
+    """Return a column or an index of numbers, dates or durations in seconds."""
+    if getattr(getattr(cells, "dt", cells), "tz", None) is not None:
+        cells = cells.dt.tz_convert(None) if hasattr(cells, "dt") else cells.tz_convert(None)
+    array = cells.to_numpy()
+    stamps = seconds(array, what)
+    return numeric(array, what) if stamps is None else stamps
 
 
 def write_frame(frame: Any, path: str | os.PathLike, *, overwrite: bool = False) -> None:

@@ -11,17 +11,23 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh.io.channel_map import Channel
+from jaxveh.io.canonical import canonical_unit
+from jaxveh.io.channel_map import Channel, ChannelMap
 from jaxveh.io.decimals import decimal
 from jaxveh.io.naming import check_known, listing
+from jaxveh.io.stamps import seconds
 from jaxveh.io.toml import shorten
-from jaxveh.io.units import convert, is_unit
+from jaxveh.io.units import convert, is_unit, is_unit_name
 
 TIME_NAMES = ("time", "timestamps", "timestamp", "t")
 """Names by which a time column is found, in this order and in any case."""
 
-# `wheel[3]` is a name, `speed [km/h]` is a name and a unit.
+# `wheel[3]` is a name, `speed [km/h]` is a name and a unit; `speed (km/h)` too, but not `speed (GPS)`.
 _UNIT_IN_NAME = re.compile(r"^(?P<name>.*\S)\s*\[(?!\d+\])(?P<unit>[^\[\]]*)\]$")
+_UNIT_IN_ROUND = re.compile(r"^(?P<name>.*\S)\s*\((?!\d+\))(?P<unit>[^()]+)\)$")
+
+
+_SWAP = str.maketrans(",.", ".,")
 
 
 class Column(NamedTuple):
@@ -45,15 +51,23 @@ class Log(abc.ABC):
     def column(self, name: str, group: int | None = None) -> Column:
         """Load one column; raise `InputError` for an unknown name, or cells that are not numbers."""
 
+    def column_over(self, name: str, time: Channel) -> Column:
+        """Load one column over a time column of its own; only tables have such columns."""
+        raise InputError(
+            f"{self.path}: column {name!r}: time = {time.column!r}: only for CSV and Parquet; here each column has its time "
+            "stamps. Leave it out of the channel map."
+        )
+
     def close(self) -> None:  # noqa: B027  most logs keep no file open
         """Close the file."""
 
 
 class TableLog(Log):
-    """A log whose columns share one time column: CSV and Parquet.
+    """A log whose columns share one time column, or have one of their own: CSV and Parquet.
 
     `headings` are the names of the columns, `load` returns the cells of one; a name may have its unit in brackets
-    (`yaw_rate [deg/s]`), unless `units` has it.
+    (`yaw_rate [deg/s]`), unless `units` has it. `point` is the decimal sign of texts. A name that several columns have can be
+    neither a known channel nor be loaded.
     """
 
     def __init__(
@@ -63,31 +77,48 @@ class TableLog(Log):
         load: Callable[[str], object],
         units: Mapping[str, str],
         note: str,
-        time: Channel | None,
+        channels: ChannelMap | None,
+        point: str = ".",
     ):
-        self.path, self.note, self._load = path, note, load
+        self.path, self.note, self._load, self._point = path, note, load, point
+        self._twice = {heading for heading in headings if headings.count(heading) > 1}
         plain = {h: (h, units[h]) if h in units else split_unit(h) for h in headings}
+        shorts = [name for name, _ in plain.values()]
+        alike = {name for name in shorts if shorts.count(name) > 1}
+        if told := sorted(name for name in alike if canonical_unit(name) is not None):
+            raise InputError(
+                f"{path}: several columns have the same name without their [unit], {told[0]!r}; rename them."
+            )
+        plain = {heading: (heading if name in alike else name, unit) for heading, (name, unit) in plain.items()}
         self._heading = {name: heading for heading, (name, _) in plain.items()}
         self._units = dict(plain.values())
-        if len(self._heading) < len(plain):
-            raise InputError(f"{path}: several columns have the same name without their [unit]; rename them.")
-        time_name = self._find_time(time)
+        time = channels.time if channels else None
+        time_name = self._find_time(time) if channels is None or channels.shares_time else None
         self.names = tuple(name for name in self._heading if name != time_name)
-        stamps, unit = self._values(time_name), (time and time.unit) or self._units[time_name]
-        if time is not None:
-            stamps = apply(time, stamps)
-        self._time = convert(stamps, unit, "s", f"{path}: {time_name}") if is_unit(unit) else stamps
-        if self._time.size == 0:
-            raise InputError(f"{path}: the log is empty: it has columns but no row.")
+        self._time = None if time_name is None else self._stamps(time_name, time)
 
     def column(self, name: str, group: int | None = None) -> Column:
         name = self._plain(name)
+        assert self._time is not None
         return Column(self._time, self._values(name), self._units[name])
+
+    def column_over(self, name: str, time: Channel) -> Column:
+        """Load one column over a time column of its own, without the rows in which that is empty."""
+        name, stamps = self._plain(name), self._stamps(self._plain(time.column), time)
+        rows = np.isfinite(stamps)
+        stamps, values = stamps[rows], self._values(name)[rows]
+        if np.any(np.diff(stamps) <= 0):
+            k = int(np.argmax(np.diff(stamps) <= 0))
+            raise InputError(
+                f"{self.path}: column {time.column!r}: {stamps[k + 1]} s after {stamps[k]} s: the times of {name!r} must be "
+                "strictly increasing."
+            )
+        return Column(stamps, values, self._units[name])
 
     def _plain(self, name: str) -> str:
         """Return the name without unit of a column that may be given with its unit."""
         if name not in self._heading and name in self._heading.values():
-            name = split_unit(name)[0]
+            name = next(plain for plain, heading in self._heading.items() if heading == name)
         check_known(str(self.path), "column", name, self._heading, "Name the file's column in the channel map.")
         return name
 
@@ -103,13 +134,36 @@ class TableLog(Log):
             'Name it in a channel map: time = "COLUMN".'
         )
 
+    def _stamps(self, name: str, told: Channel | None) -> np.ndarray:
+        """Return a time column in seconds; dates and times of day need no unit."""
+        what = f"{self.path}: column {name!r}"
+        stamps = seconds(self._cells(name), what)
+        if stamps is not None:
+            if told is not None and is_unit(told.unit) and told.unit != "s":
+                raise InputError(f"{what}: unit {told.unit!r}, but it has dates or times of day; leave the unit out.")
+            stamps = stamps if told is None else apply(told, stamps)
+        else:
+            unit = (told and told.unit) or self._units[name]
+            stamps = self._values(name) if told is None else apply(told, self._values(name))
+            stamps = convert(stamps, unit, "s", f"{self.path}: {name}") if is_unit(unit) else stamps
+        if stamps.size == 0:
+            raise InputError(f"{self.path}: the log is empty: it has columns but no row.")
+        return stamps
+
+    def _cells(self, name: str) -> object:
+        if self._heading[name] in self._twice:
+            raise InputError(f"{self.path}: several columns are named {self._heading[name]!r}; rename them.")
+        return self._load(self._heading[name])
+
     def _values(self, name: str) -> np.ndarray:
-        return numeric(self._load(self._heading[name]), f"{self.path}: column {name!r}")
+        return numeric(self._cells(name), f"{self.path}: column {name!r}", self._point)
 
 
 def split_unit(heading: str) -> tuple[str, str]:
-    """`yaw_rate [deg/s]` as `("yaw_rate", "deg/s")`; a heading without brackets has the unit ""."""
+    """`yaw_rate [deg/s]` or `yaw_rate (deg/s)` as `("yaw_rate", "deg/s")`; a heading without a unit has the unit ""."""
     match = _UNIT_IN_NAME.match(heading)
+    if match is None and (found := _UNIT_IN_ROUND.match(heading)) is not None and is_unit_name(found["unit"].strip()):
+        match = found
     return (match["name"], match["unit"].strip()) if match else (heading.strip(), "")
 
 
@@ -120,8 +174,11 @@ def apply(channel: Channel, values: np.ndarray) -> np.ndarray:
     return -values if channel.sign < 0 else values
 
 
-def numeric(cells, what: str) -> np.ndarray:
-    """Return cells as a float array (n,), empty ones as NaN; the error names the first row whose cell is not a number."""
+def numeric(cells, what: str, point: str = ".") -> np.ndarray:
+    """Return cells as a float array (n,), empty ones as NaN; the error names the first row whose cell is not a number.
+
+    `point` is the decimal sign of texts.
+    """
     array = np.asarray(cells)
     if array.ndim == 1 and array.dtype.name == "bfloat16":
         return array
@@ -135,16 +192,18 @@ def numeric(cells, what: str) -> np.ndarray:
         return array.astype(np.float64)
     if array.dtype.kind in "mM":
         raise InputError(f"{what}: contains dates, not numbers. Convert it to seconds first, or leave it out.")
-    return np.array([_cell(cell, row, what) for row, cell in enumerate(array.tolist())], dtype=np.float64)
+    return np.array([_cell(cell, row, what, point) for row, cell in enumerate(array.tolist())], dtype=np.float64)
 
 
-def _cell(cell, row: int, what: str) -> float:
+def _cell(cell, row: int, what: str, point: str) -> float:
     if cell is None:
         return np.nan
     try:
-        return decimal(cell) if isinstance(cell, str) else float(cell)
+        # With a decimal comma, a point would be one of thousands.
+        swapped = cell.translate(_SWAP) if isinstance(cell, str) and point == "," else cell
+        return decimal(swapped) if isinstance(swapped, str) else float(swapped)
     except (TypeError, ValueError, OverflowError) as error:
-        comma = isinstance(cell, str) and re.fullmatch(r"\s*[-+]?\d+,\d+\s*", cell)
+        comma = isinstance(cell, str) and point == "." and re.fullmatch(r"\s*[-+]?\d+,\d+\s*", cell)
         advice = (
             'Decimal commas: set decimal = "," under [csv] in the channel map.'
             if comma

@@ -102,7 +102,7 @@ def open_netcdf(path: Path, channels: ChannelMap | None) -> TableLog:
     columns = {name: one for name, one in both.items() if one.dims == dims and len(dims) == 1}
     units = {name: one.unit for name, one in columns.items() if is_unit(one.unit)}
     load = lambda name: columns[name].values
-    log = TableLog(path, tuple(columns), load, units, labelled.source, channels.time if channels else None)
+    log = TableLog(path, tuple(columns), load, units, labelled.source, channels)
     log.as_saved = labelled.kind == "Recording"
     return log
 

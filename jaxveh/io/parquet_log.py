@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import ml_dtypes
 import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh.io.channel_map import ChannelMap
-from jaxveh.io.log import TableLog
+from jaxveh.io.log import TIME_NAMES, TableLog, split_unit
 from jaxveh.io.optional import require
 
+_INDEX = "__index_level_"
 _UNIT = b"unit"
 _UNITS = (_UNIT, b"units", b"Unit", b"Units")
 _SOURCE = b"source"
@@ -26,26 +28,27 @@ def open_parquet(path: Path, channels: ChannelMap | None) -> TableLog:
     parquet = require("pyarrow.parquet", "reading Parquet")
     try:
         schema = parquet.read_schema(path)
-        headings = [name for name in schema.names if not name.startswith("__index_level_")]
-        units = {name: unit for name in headings if (unit := _unit(schema.field(schema.names.index(name))))}
+        headings = [name for name in schema.names if not name.startswith(_INDEX)]
+        index = _index(schema, headings) if channels is None or channels.time is None else None
+        headings = headings if index is None else ["time", *headings]
+        place = lambda name: schema.names.index(index if index is not None and name == "time" else name)
+        units = {name: unit for name in headings if (unit := _unit(schema.field(place(name))))}
         note = (schema.metadata or {}).get(_SOURCE, b"").decode()
-        told = {name: (schema.field(schema.names.index(name)).metadata or {}).get(_DTYPE) for name in headings}
+        told = {name: (schema.field(place(name)).metadata or {}).get(_DTYPE) for name in headings}
         odd = {name: ml_dtypes.bfloat16 for name, dtype in told.items() if dtype == b"bfloat16"}
     except Exception as error:  # pyarrow raises any kind of error for a damaged block
         raise InputError(f"{path}: is not a readable Parquet file ({error}).") from error
-    twice = sorted({name for name in headings if headings.count(name) > 1})
-    if twice:
-        raise InputError(f"{path}: several columns are named {', '.join(map(repr, twice))}; rename them.")
 
     def load(heading: str) -> np.ndarray:
+        stored = schema.names[place(heading)]
         try:
             with parquet.ParquetFile(path) as file:
-                values = file.read(columns=[heading]).column(heading).to_numpy()
+                values = file.read(columns=[stored]).column(stored).to_numpy()
             return values if heading not in odd else values.astype(odd[heading])
         except Exception as error:  # as above
             raise InputError(f"{path}: column {heading!r} cannot be read ({error}).") from error
 
-    log = TableLog(path, headings, load, units, note, channels.time if channels else None)
+    log = TableLog(path, headings, load, units, note, channels)
     log.as_saved = _OWN in (schema.metadata or {})
     return log
 
@@ -68,6 +71,18 @@ def write_parquet(
     ]
     schema = arrow.schema(fields, metadata={_OWN: b"Recording", **({_SOURCE: note} if note else {})})
     parquet.write_table(arrow.table([arrow.array(values) for values in arrays.values()], schema=schema), path)
+
+
+def _index(schema: Any, headings: list[str]) -> str | None:
+    """Return the column of an index of pandas without a name, if it is the only time: floats, dates or durations."""
+    arrow = require("pyarrow", "reading Parquet")
+    if any(split_unit(name)[0].casefold() in TIME_NAMES for name in headings):
+        return None
+    is_time = (arrow.types.is_floating, arrow.types.is_timestamp, arrow.types.is_duration)
+    found = [
+        name for name in schema.names if name.startswith(_INDEX) and any(of(schema.field(name).type) for of in is_time)
+    ]
+    return found[0] if len(found) == 1 else None
 
 
 def _unit(field) -> str:

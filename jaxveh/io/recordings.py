@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import os
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh._core.recording import Recording
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
@@ -25,8 +26,19 @@ from jaxveh.io.netcdf import open_netcdf, write_recording_netcdf
 from jaxveh.io.parquet_log import open_parquet, write_parquet
 from jaxveh.io.units import convert, is_unit
 
+
+def open_dat(path: Path, channels: ChannelMap | None) -> Log:
+    """Open a `.dat` file, which is MDF of version 3 (as INCA writes it) or text."""
+    with path.open("rb") as file:
+        is_mdf = file.read(3) == b"MDF"
+    return open_mdf(path, channels) if is_mdf else open_csv(path, channels)
+
+
 _OPEN: dict[str, Callable[[Path, ChannelMap | None], Log]] = {
     ".csv": open_csv,
+    ".txt": open_csv,
+    ".tsv": open_csv,
+    ".dat": open_dat,
     ".parquet": open_parquet,
     ".mf4": open_mdf,
     ".mdf": open_mdf,
@@ -41,10 +53,30 @@ _WRITE = {
     ".mdf": write_mdf,
     ".nc": write_recording_netcdf,
 }
+_ELSEWHERE = {
+    ".xlsx": "save the sheet as CSV",
+    ".xls": "save the sheet as CSV",
+    ".vbo": "export it as CSV from the VBOX software, with time in seconds",
+    ".ld": "export it as CSV from MoTeC i2",
+    ".xrk": "export it as CSV from AiM's Race Studio",
+    ".blf": "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)",
+    ".asc": "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)",
+    ".trc": "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)",
+    ".bag": "convert it to MCAP (`mcap convert`)",
+    ".db3": "convert it to MCAP (`mcap convert`)",
+    ".feather": "save it as Parquet (`pandas.read_feather`, then `to_parquet`)",
+    ".pkl": "save it as Parquet (`to_parquet`)",
+    ".h5": "load its arrays and make a `jaxveh.Recording`, or write MATLAB 7.3, NetCDF or Parquet",
+    ".hdf5": "load its arrays and make a `jaxveh.Recording`, or write MATLAB 7.3, NetCDF or Parquet",
+}
+"""What to do with logs that are not read, by the ending of their names."""
+
 SUFFIXES = tuple(_WRITE)
 """File name endings that are read and written."""
 LOG_SUFFIXES = tuple(_OPEN)
 """File name endings that are read."""
+MOST_NAMED = 8
+"""The number of columns that a message names."""
 
 
 def read_recording(
@@ -54,20 +86,24 @@ def read_recording(
     raster: str | None = None,
     method: str = "linear",
 ) -> Recording:
-    """Read a log: `.csv`, `.parquet`, `.mf4` or `.mdf`, MATLAB's `.mat` (structs included), `.mcap` (topics of JSON messages), or
-    NetCDF 4 (`.nc`).
+    """Read a log: text (`.csv`, `.txt`, `.tsv`, `.dat`), `.parquet`, `.mf4` or `.mdf` (also as `.dat`), MATLAB's `.mat` (structs
+    included), `.mcap` (topics of JSON messages), or NetCDF 4 (`.nc`).
 
     **Arguments**: `channels`: a channel map or the path of one (see `io.channel_map.CHANNEL_MAP_SCHEMA`); without it every column
-    is a channel with its own name, and time is the column `time`, `timestamps`, `timestamp` or `t`. `raster`: the name
+    is a channel with its own name, and time is the column `time`, `timestamps`, `timestamp` or `t`; columns that are no numbers
+    are left out with a warning, unless they have the name of a known channel. `raster`: the name
     of a channel whose samples become the rows; the others are filled there by `method` (`linear`, `hold`; `io.resample`).
 
     **Units**: those of the channel map, otherwise those of the file (Parquet: the field's metadata `unit`; MDF4: the channel's
-    unit; MATLAB: `Units` beside the data; CSV and Parquet: `name [unit]` in the first line), otherwise SI. Channels of
-    `io.CANONICAL` are converted to SI; other channels keep their unit.
+    unit; MATLAB: `Units` beside the data; text: a line of units below the names; text and Parquet: `name [unit]` or
+    `name (unit)`), otherwise SI. Channels of `io.CANONICAL` are converted to SI; other channels keep their unit.
 
     **Time base**: MDF4 groups, MATLAB structs and MCAP topics of different rasters are merged, not resampled: a row for every
     time stamp, NaN where a sensor has no sample. Time stamps keep the log's own time, in seconds, on the host in float64;
-    channels have JAX's float type.
+    channels have JAX's float type. Dates become seconds since 1970, times of day seconds.
+
+    **Text** may have lines above the names of the columns, a line of units below them, `,`, `;`, tabs, `|` or blanks between
+    cells, and decimal commas. What was assumed (lines above that are not read, an encoding) is told in a `JaxvehWarning`.
 
     **Raises** `InputError` naming file, column, row, value and remedy: a missing file, an unknown suffix, a broken file, an
     empty log, an unknown column, a unit of another dimension, a cell that is not a number, time that does not increase.
@@ -88,16 +124,23 @@ def _read(
     as_saved: bool,
 ) -> Recording:
     path = Path(path)
+    if (advice := _ELSEWHERE.get(path.suffix.lower())) is not None:
+        raise InputError(
+            f"{path}: suffix {path.suffix!r} is not read: {advice}. A log must end in one of {', '.join(_OPEN)}."
+        )
     suffix = check_suffix(path, _OPEN, "log")
     check_readable(path)
     chosen = channels if isinstance(channels, ChannelMap) or channels is None else read_channel_map(channels)
     with contextlib.closing(_OPEN[suffix](path, chosen)) as log:
-        wanted = chosen.channels if chosen else {name: Channel(name) for name in log.names}
-        if not wanted:
-            raise InputError(f"{path}: has no channel except time.")
         as_saved = as_saved and log.as_saved
-        load = (lambda name, channel: log.column(name)) if as_saved else lambda name, channel: _load(log, name, channel)
-        loaded = {name: load(name, channel) for name, channel in wanted.items()}
+        if as_saved:
+            loaded = {name: log.column(name) for name in log.names}
+        elif chosen and chosen.channels:
+            loaded = {name: _load(log, name, channel) for name, channel in chosen.channels.items()}
+        else:
+            loaded = _load_all(log)
+        if not loaded:
+            raise InputError(f"{path}: has no channel except time.")
         note = log.note if as_saved else log.note or path.name
     time, values = merge(loaded)
     if as_saved:
@@ -151,8 +194,31 @@ def write_columns(
         _WRITE[suffix](part, np.asarray(time, dtype=np.float64), columns, units, note)
 
 
+def _load_all(log: Log) -> dict[str, Column]:
+    """Load every column by its own name, without those that are no channels: texts, dates, names that are there twice.
+
+    A `JaxvehWarning` names them. **Raises** `InputError` for a known channel that cannot be read, and if no column can be.
+    """
+    loaded, left = {}, {}
+    for name in log.names:
+        try:
+            loaded[name] = _load(log, name, Channel(name))
+        except InputError as error:
+            if canonical_unit(name) is not None:
+                raise
+            left[name] = error
+    if left and not loaded:
+        raise next(iter(left.values()))
+    if left:
+        first, *more = left
+        names = f"{first!r}" + (f", and {len(more)} more ({', '.join(more[:MOST_NAMED])})" if more else "")
+        warnings.warn(f"left out {names}: {left[first]}", JaxvehWarning, stacklevel=2)
+    return loaded
+
+
 def _load(log: Log, name: str, channel: Channel) -> Column:
-    column = log.column(channel.column, channel.group)
+    own = channel.time
+    column = log.column(channel.column, channel.group) if own is None else log.column_over(channel.column, own)
     values, target = apply(channel, column.values), canonical_unit(name)
     unit = channel.unit if is_unit(channel.unit) else column.unit
     what = f"{log.path}: {name}" + (f" (column {channel.column!r})" if channel.column != name else "")

@@ -44,7 +44,16 @@ COLUMNS = {
 """Names of the columns of a CSV file (the first that is present counts), and the unit of a name without one."""
 
 LARGEST = {"slip_angle": 1.0, "camber": 1.2}
-"""Angles (rad) beyond which numbers without a unit are assumed to be degrees: 57 degrees of slip, 69 of camber."""
+"""Angles (rad) beyond which numbers without a unit are refused: 57 degrees of slip, 69 of camber."""
+
+OTHER_UNITS = {
+    "slip_angle": (0.0, LARGEST["slip_angle"], "deg"),
+    "camber": (0.0, LARGEST["camber"], "deg"),
+    "slip_ratio": (0.0, 5.0, "%"),
+    "load": (50.0, np.inf, "kN"),
+    "pressure": (5000.0, np.inf, "kPa"),
+}
+"""The range of the largest size of numbers without a unit, in SI, and the unit that they probably have outside it."""
 
 RIGHT_ANGLE = np.pi / 2
 
@@ -127,8 +136,8 @@ def read_rig_table(
 ) -> RigTable:
     """Read rig data; several files are joined, each as a run. The kind of a file follows from its suffix and its columns:
 
-    - CSV with one header line, with the names of `COLUMNS` in SI units, or with a unit in the name (`alpha [deg]`); missing slips
-      are zero; an empty cell is a missing measurement.
+    - CSV with the names of `COLUMNS` in SI units, or with a unit in the name (`alpha [deg]`) or in a line below the names; missing
+      slips are zero; an empty cell is a missing measurement. Separators and decimal commas are found (`csv_layout.find_layout`).
     - Files of the Formula SAE Tire Test Consortium (`.dat`, `.txt`, `.mat`, and a `.csv` with its names): see `ttc.read_ttc`.
     - TYDEX (`.tdx`, `.tyd`, `.tydex`): see `tydex.read_tydex`.
 
@@ -136,8 +145,8 @@ def read_rig_table(
     positive slip angle gives a negative force), SAE for the consortium's files, where FZ is negative. `measured`: the forces
     and moments to read.
 
-    **Raises** `InputError` like `RigTable`, `read_ttc` and `read_tydex`, for unknown axes, for angles without a unit that must be
-    degrees, for the consortium's files if FZ is not negative as in SAE's axes and `axes` is not given, and for files with
+    **Raises** `InputError` like `RigTable`, `read_ttc` and `read_tydex`, for unknown axes, for numbers without a unit that
+    cannot be in SI units (`OTHER_UNITS`), for the consortium's files if FZ is not negative as in SAE's axes and `axes` is not given, and for files with
     different inputs.
     """
     if axes is not None:
@@ -200,18 +209,26 @@ def _ttc_axes(path: Path, load: np.ndarray) -> str:
 
 
 def _read_csv(path: Path, measured: tuple[str, ...]) -> dict[str, np.ndarray | None]:
-    cells = {split_unit(heading): column for heading, column in read_columns(path).items()}
-    units = dict(cells.keys())
-    columns = {name: column for (name, _), column in cells.items()}
+    table = read_columns(path)
+    plain = {heading: split_unit(heading) for heading in table.headings}
+    plain |= {heading: (heading, unit) for heading, unit in table.units.items() if unit}
+    names = [name for name, _ in plain.values()]
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        raise InputError(f"{path}: several columns are named {', '.join(map(repr, twice))}; rename them.")
+    units = dict(plain.values())
+    columns = {
+        name: lambda heading=heading: numeric(table.cells[heading], f"{path}: column {heading!r}", table.point)
+        for heading, (name, _) in plain.items()
+    }
     _refuse_turn_slip(path, columns)
     found: dict[str, np.ndarray | None] = {}
     for field, (names, unit) in COLUMNS.items():
         name = next((name for name in names if name in columns), None)
         if name is None or (field in RIG_CHANNELS and field not in measured):
             continue
-        values = numeric(columns[name], f"{path}: column {name!r}")
+        values = columns[name]()
         if not is_unit(units[name]):
-            _refuse_degrees(path, field, name, values)
+            _refuse_other_unit(path, field, name, values)
         found[field] = convert(values, units[name], unit, f"{path}: {name}") if is_unit(units[name]) else values
     if "load" not in found:
         raise InputError(f"{path}: no load among the columns {', '.join(columns)}: {COLUMNS['load'][0][0]} is needed.")
@@ -225,20 +242,23 @@ def _read_csv(path: Path, measured: tuple[str, ...]) -> dict[str, np.ndarray | N
     return found
 
 
-def _refuse_degrees(path: Path, field: str, name: str, values: np.ndarray) -> None:
-    """Raise `InputError` if angles without a unit are too large for radians."""
-    if field not in LARGEST or not np.any(np.abs(values) > LARGEST[field]):
+def _refuse_other_unit(path: Path, field: str, name: str, values: np.ndarray) -> None:
+    """Raise `InputError` if numbers without a unit cannot be in SI units."""
+    low, high, likely = OTHER_UNITS.get(field, (0.0, np.inf, ""))
+    size = float(np.nanmax(np.abs(values), initial=0.0))
+    if low <= size <= high or size == 0:
         return
-    size = np.nanmax(np.abs(values))
+    unit = COLUMNS[field][1].replace("dimensionless", "1")
+    shown = f", {np.degrees(size):.0f} degrees" if unit == "rad" else ""
     raise InputError(
-        f"{path}: {name} goes to {size:.4g} without a unit, which would be radians, {np.degrees(size):.0f} degrees: if these are "
-        f"degrees, name the column '{name} [deg]', otherwise '{name} [rad]'."
+        f"{path}: {name} goes to {size:.4g} without a unit, which would be in {unit}{shown}: name the column '{name} [{likely}]' "
+        f"(or another unit), or '{name} [{unit}]' if that is right."
     )
 
 
 def _refuse_turn_slip(path: Path, columns: dict) -> None:
     for name in ("in_phit", "phit", "turn_slip"):
-        if name in columns and numeric(columns[name], f"{path}: column {name!r}").any():
+        if name in columns and columns[name]().any():
             raise InputError(
                 f"{path}: {name} is not 0 in every row: a rig table has no turn slip; leave these rows out."
             )

@@ -37,6 +37,11 @@ _PREFIXED = {
 }  # fmt: skip
 """The prefixes with which a unit is in use. pint puts any prefix in front of any unit: `Grad` would be a gigaradian."""
 
+_QUANTITIES = ("m/s", "rad", "rad/s", "m/s^2", "m", "N", "N*m", "Pa", "1")
+_LETTERS = ("s", "m", "g", "G", "N", "°", "%")
+"""Single letters that are units in a name. Others tell one channel from another, such as `c` (for pint, the speed of light)."""
+_TIMES = ("s", "sec", "ms", "us", "µs", "ns")
+
 _GRAD = re.compile(r"grad\b", re.IGNORECASE)
 _POWER = re.compile(r"(?<=[A-Za-z])-(?=\d)")
 
@@ -81,6 +86,22 @@ def convert(values, unit: str, target: str, what: str) -> np.ndarray:
             "Correct the unit in the channel map, or map another column."
         )
     return np.asarray(registry.Quantity(np.asarray(values, dtype=np.float64), source).to(wanted).magnitude)
+
+
+@functools.cache
+def is_unit_name(text: str) -> bool:
+    """Whether a text in the place of a unit is one of a channel's, such as `km/h`; not `GPS`, `max` or `l` for left."""
+    if len(text) == 1 and text not in _LETTERS:
+        return False
+    if text in _TIMES or _GRAD.match(text):
+        return True
+    for quantity in _QUANTITIES:
+        try:
+            convert(1.0, text, quantity, "unit")
+        except InputError:
+            continue
+        return True
+    return False
 
 
 @functools.cache

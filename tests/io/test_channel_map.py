@@ -72,10 +72,11 @@ def test_columns_out_of_the_map_may_hold_words(tmp_path):
 
 def test_the_schema_is_a_map(toml):
     channels = io.read_channel_map(toml(CHANNEL_MAP_SCHEMA))
-    assert channels.channels["yaw_rate"] == io.Channel("Gierrate", "deg/s", -1, 1.0, 0.0, 3)
+    assert channels.channels["yaw_rate"] == io.Channel("Gierrate", "deg/s", -1, 1.0, 0.0, 3, io.Channel("Time_2"))
     assert channels.channels["v_x"] == io.Channel("Speed")
     assert channels.time == io.Channel("Time")
     assert (channels.separator, channels.decimal) == (";", ",")
+    assert (channels.names_line, channels.encoding) == (15, "utf-8")
 
 
 BROKEN = {
@@ -87,7 +88,7 @@ BROKEN = {
     ),
     "csv key unknown": ('[csv]\ndezimal = ","', r"\[csv\]: no key 'dezimal' \(did you mean 'decimal'"),
     "no column": ('[channels.v_x]\nunit = "m/s"', r"\[channels.v_x\]: has no `column`"),
-    "no channels": ('time = "Zeit"', r"has no channel"),
+    "no channels": ("[channels]", r"has no channel"),
     "channels no table": ("channels = 3", r"channels = 3: must be tables"),
     "entry a number": ("[channels]\nv_x = 3", r"\[channels.v_x\] = 3: must be a table"),
     "unit a number": ("[channels.v_x]\ncolumn = 'Speed'\nunit = 3", r"\[channels.v_x\]: unit = 3: must be a string"),
@@ -99,6 +100,12 @@ BROKEN = {
     "group half": ("[channels.v_x]\ncolumn = 'Speed'\ngroup = 0.5", r"group = 0.5: must be a whole number"),
     "decimal": ("[channels]\nv_x = 'Speed'\n[csv]\ndecimal = ';'", r"decimal = ';': must be one of '.', ','"),
     "separator": ("[channels]\nv_x = 'Speed'\n[csv]\nseparator = ';;'", r"separator = ';;': must be one character"),
+    "separator and decimal": ("[csv]\nseparator = ','\ndecimal = ','", r"separator and decimal are both ','"),
+    "line 0": ("[csv]\nnames_line = 0", r"names_line = 0: must be a whole number from 1"),
+    "line half": ("[csv]\nnames_line = 1.5", r"names_line = 1.5: must be a whole number"),
+    "line below the end": ("[csv]\nnames_line = 99", r"names_line = 99: must be at most"),
+    "encoding": ("[csv]\nencoding = 'utf-9'", r"encoding = 'utf-9': is not known"),
+    "time a number": ("[channels.v_x]\ncolumn = 'Speed'\ntime = 3", r"\[channels.v_x\]: time = 3: must be a table"),
     "column unknown": (
         "time='Zeit'\n[channels]\nv_x = 'Sped'",
         r"no column 'Sped' \(did you mean 'Speed'\?\); there are: S",

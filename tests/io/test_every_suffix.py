@@ -74,8 +74,9 @@ WAYS = {
 
 
 def test_every_suffix_is_here():
-    assert {way for way in WAYS if way.startswith(".")} == set(io.LOG_SUFFIXES)
-    assert set(io.SUFFIXES) | {".mat", ".mcap"} == set(io.LOG_SUFFIXES)
+    texts = {".txt", ".tsv", ".dat"}  # read like .csv, and not written: see test_loggers
+    assert {way for way in WAYS if way.startswith(".")} | texts == set(io.LOG_SUFFIXES)
+    assert set(io.SUFFIXES) | {".mat", ".mcap"} | texts == set(io.LOG_SUFFIXES)
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
@@ -118,7 +119,8 @@ def test_a_suffix_that_is_not_read_is_told_with_those_that_are(tmp_path):
         path.write_text("x")
         for read in (io.read_recording, Recording.load):
             with pytest.raises(
-                InputError, match=r"must end in one of \.csv, \.parquet, \.mf4, \.mdf, \.mat, \.mcap, \.nc\."
+                InputError,
+                match=r"must end in one of \.csv, \.txt, \.tsv, \.dat, \.parquet, \.mf4, \.mdf, \.mat, \.mcap, \.nc\.",
             ) as told:
                 read(path)
         assert ("Did you mean .mcap?" in str(told.value)) == (suffix == ".MCPA")

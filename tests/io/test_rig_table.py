@@ -75,7 +75,7 @@ def test_files_are_joined_and_each_is_a_run(csv, tydex, tmp_path):
     assert len(second.load) == 2 and second.camber is None
     np.testing.assert_array_equal(second.F_x, [100.0, 200.0])
     other = tmp_path / "runs.csv"
-    other.write_text("Fz,alpha,Vx,Fy,run\n1,0,20,1,5\n1,0,20,1,9\n")
+    other.write_text("Fz,alpha,Vx,Fy,run\n100,0,20,1,5\n100,0,20,1,9\n")
     np.testing.assert_array_equal(io.read_rig_table([other, tydex]).run, [0, 1, 2, 2])
 
 
@@ -126,3 +126,44 @@ def test_bad_arguments_are_named(csv, tydex, tmp_path):
         io.read_rig_table(tmp_path / "rig.xlsx")
     with pytest.raises(InputError, match="must all be"):
         io.RigTable(np.zeros(2), np.zeros(3), np.ones(2), F_y=np.ones(2))
+
+
+OTHER_UNITS = {
+    "load in kN": (
+        "Fz,alpha,Fy\n4,0.1,3\n6,0.1,4\n",
+        r"Fz goes to 6 without a unit, which would be in N: .*'Fz \[kN\]'",
+    ),
+    "slip in per cent": ("Fz,kappa,Fx\n4000,-12,3\n4000,10,4\n", r"kappa goes to 12 .*in 1: .*'kappa \[%\]'"),
+    "pressure in kPa": ("Fz,alpha,P,Fy\n4000,0.1,83,3\n", r"P goes to 83 .*in Pa: .*'P \[kPa\]'"),
+    "pressure in bar": ("Fz,alpha,P,Fy\n4000,0.1,2.2,3\n", r"P goes to 2.2 .*in Pa"),
+    "slip angle in degrees": ("Fz,alpha,Fy\n4000,8,3\n", r"alpha goes to 8 .*in rad, 458 degrees: .*'alpha \[deg\]'"),
+}
+
+
+@pytest.mark.parametrize("case", OTHER_UNITS)
+def test_numbers_without_a_unit_that_cannot_be_in_si_are_refused(tmp_path, case):
+    text, words = OTHER_UNITS[case]
+    path = tmp_path / "rig.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        io.read_rig_table(path)
+
+
+FORMS = {
+    "a line of units": "Fz,alpha,Fy\nkN,deg,N\n4,-6,3000.5\n5,3,-2000\n",
+    "units in round brackets": "Fz (kN),alpha (deg),Fy (N)\n4,-6,3000.5\n5,3,-2000\n",
+    "decimal commas": "Fz [kN];alpha [deg];Fy\n4,0;-6,0;3000,5\n5,0;3,0;-2000,0\n",
+    "lines above": "Rig 3\nTyre,205/55 R16\n\nFz [kN],alpha [deg],Fy\n4,-6,3000.5\n5,3,-2000\n",
+    "empty rows below": "Fz [kN],alpha [deg],Fy\n4,-6,3000.5\n5,3,-2000\n,,\n,,\n",
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.filterwarnings("ignore:.*lines above are not read:jaxveh.JaxvehWarning")
+def test_every_form_of_csv_is_one_table(tmp_path, form):
+    path = tmp_path / "rig.csv"
+    path.write_text(FORMS[form])
+    table = io.read_rig_table(path)
+    np.testing.assert_allclose(table.load, [4000.0, 5000.0])
+    np.testing.assert_allclose(table.slip_angle, np.radians([6.0, -3.0]))
+    np.testing.assert_allclose(table.F_y, [3000.5, -2000.0])

@@ -1,0 +1,75 @@
+"""Time stamps as seconds: dates, durations, and their texts in logs, such as `2024-03-01T10:00:00.5Z` or `10:05:03.120`."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh.io.optional import require
+from jaxveh.io.toml import shorten
+
+DAY, HALF = 86_400.0, 43_200.0
+"""A day, and the step back beyond which a clock without a date has passed midnight, s."""
+
+_DATE = re.compile(r"\s*\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?\s*(Z|UTC|[+-]\d\d:?\d\d)?\s*")
+_DURATION = re.compile(r"\s*(?P<days>\d+) days?\s+(?P<clock>\d+:\d\d:\d\d([.,]\d+)?)\s*")
+_CLOCK = re.compile(r"\s*(?P<hours>\d+):(?P<minutes>[0-5]\d):(?P<seconds>[0-5]\d([.,]\d+)?)\s*")
+_MINUTES = re.compile(r"\s*(?P<minutes>\d+):(?P<seconds>[0-5]\d[.,]\d+)\s*")
+
+
+def is_stamp(text: str) -> bool:
+    """Whether a text is a time stamp in one of the forms that `seconds` reads."""
+    return any(form.fullmatch(text) for form in (_DATE, _DURATION, _CLOCK, _MINUTES))
+
+
+def seconds(cells: Any, what: str) -> np.ndarray | None:
+    """Return dates as seconds since 1970, and durations and times of day as seconds, (n,); None for anything else.
+
+    `cells`: an array (n,) of dates or durations, or of texts; empty ones are NaN. Dates without a zone count as UTC; times of day
+    go on after midnight.
+
+    **Raises** `InputError` for the first text that is none if others are.
+    """
+    array = np.asarray(cells)
+    if array.dtype.kind in "mM":
+        missing = np.isnat(array)
+        # Nanoseconds since 1970 have more digits than a float.
+        whole, part = np.divmod(array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64), 1_000_000_000)
+        return np.where(missing, np.nan, whole + part / 1e9)
+    texts = array.tolist() if array.dtype.kind in "OUT" else []
+    first = next((one for one in texts if isinstance(one, str) and one.strip()), "")
+    if not is_stamp(first):
+        return None
+    dates = _DATE.fullmatch(first) is not None
+    found = np.full(len(texts), np.nan)
+    for row, text in enumerate(texts):
+        if isinstance(text, str) and text.strip():
+            if not is_stamp(text) or (_DATE.fullmatch(text) is not None) != dates:
+                raise InputError(f"{what}, data row {row + 1}: {shorten(text)} is no time stamp like {shorten(first)}.")
+            found[row] = np.nan if dates else _of_clock(text)
+    if not dates:
+        back = np.concatenate([[0.0], np.diff(np.nan_to_num(found))]) < -HALF
+        return found + DAY * np.cumsum(back)
+    pandas = require("pandas", "reading dates")
+    try:
+        stamps = pandas.to_datetime([_point(one) for one in texts], format="ISO8601", utc=True)
+    except (ValueError, OverflowError) as error:
+        raise InputError(f"{what}: {error}. Write dates as 2024-03-01T10:00:00.5.") from error
+    return seconds(stamps.tz_convert(None).to_numpy(), what)
+
+
+def _point(text: Any) -> str | None:
+    """Return a date with a point before the fraction; None for an empty cell."""
+    return text.strip().replace(",", ".") if isinstance(text, str) and text.strip() else None
+
+
+def _of_clock(text: str) -> float:
+    days = 0.0
+    if (long := _DURATION.fullmatch(text)) is not None:
+        days, text = float(long["days"]), long["clock"]
+    parts = (_CLOCK.fullmatch(text) or _MINUTES.fullmatch(text)).groupdict()  # type: ignore[union-attr]
+    number = lambda name: float(parts.get(name, "0").replace(",", "."))
+    return days * DAY + number("hours") * 3600 + number("minutes") * 60 + number("seconds")
