@@ -11,13 +11,14 @@ SAE 2006-01-3606.
 from __future__ import annotations
 
 import csv
+import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh.io.csv_log import read_below
 from jaxveh.io.decimals import is_number
 from jaxveh.io.files import check_readable
@@ -118,7 +119,7 @@ def names_line(path: Path) -> tuple[int, list[str], str] | None:
 def read_ttc(path: str | Path) -> TtcTable:
     """Read a file of the consortium: text, or a MATLAB file.
 
-    The file's own units are used, and the consortium's metric units if it names none. A missing slip is taken as zero. `SR` is
+    The file's own units are used, and the consortium's metric units if it names none, with a `JaxvehWarning`. A missing slip is taken as zero. `SR` is
     not used as slip ratio: it refers to the loaded radius, so that it is not zero in free rolling.
 
     **Raises** `InputError`, naming the file and the column, for a file without `FZ`, or with neither `SA` nor `SL`; for
@@ -137,6 +138,12 @@ def read_ttc(path: str | Path) -> TtcTable:
         raise InputError(f"{path}: columns of different lengths: {lengths}.")
     if "slip_ratio" not in columns and "SR" in cells.load:
         _refuse_swept(cells.load["SR"](), path)
+    if not cells.units:
+        told = ", ".join(
+            f"{quantity} {unit}" for quantity, unit in METRIC.items() if quantity not in ("ratio", "number")
+        )
+        words = f"{path}: names no units; those of the consortium's metric files are assumed: {told}."
+        warnings.warn(words, JaxvehWarning, stacklevel=2)
     zero = np.zeros(len(columns["load"]))
     return TtcTable({"slip_angle": zero, "slip_ratio": zero, **columns}, cells.title, str(path))
 

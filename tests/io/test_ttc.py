@@ -5,7 +5,7 @@ import pytest
 import scipy.io
 
 from jaxveh import io
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh.io.ttc import COLUMNS, UNITS, read_ttc
 
 FORM = """
@@ -107,10 +107,14 @@ def test_without_units_they_are_metric(tmp_path):
     path = tmp_path / "run.csv"
     lines = text(rows(), separator=",").splitlines()
     path.write_text("\n".join([lines[1], *lines[3:]]))
-    np.testing.assert_allclose(io.read_rig_table(path).slip_angle, np.radians(rows()["SA"]), rtol=1e-8)
+    with pytest.warns(JaxvehWarning, match="names no units; those of .* metric files are assumed: angle deg, force n,"):
+        table = io.read_rig_table(path)
+    np.testing.assert_allclose(table.slip_angle, np.radians(rows()["SA"]), rtol=1e-8)
     channel = {name: values for name, values in rows().items() if name in ("SA", "FZ", "FY")}
     scipy.io.savemat(tmp_path / "bare.mat", channel)
-    np.testing.assert_allclose(io.read_rig_table(tmp_path / "bare.mat").F_y, -rows()["FY"])
+    with pytest.warns(JaxvehWarning, match="bare.mat: names no units"):
+        table = io.read_rig_table(tmp_path / "bare.mat")
+    np.testing.assert_allclose(table.F_y, -rows()["FY"])
 
 
 def test_a_unit_in_a_name_and_other_lines_above(tmp_path):
