@@ -13,13 +13,27 @@ from jaxveh.io.decimals import decimal
 from jaxveh.io.files import check_readable, replacing_file
 
 PROPERTY_UNITS = {
-    "LENGTH": {"meter": 1.0, "metre": 1.0, "m": 1.0, "mm": 1e-3, "millimeter": 1e-3, "cm": 1e-2, "inch": 0.0254},
-    "FORCE": {"newton": 1.0, "n": 1.0, "kn": 1e3, "pound_force": 4.4482216152605},
+    "LENGTH": {
+        **{"meter": 1.0, "metre": 1.0, "m": 1.0, "mm": 1e-3, "millimeter": 1e-3, "millimetre": 1e-3, "cm": 1e-2},
+        **{
+            "centimeter": 1e-2,
+            "centimetre": 1e-2,
+            "km": 1e3,
+            "kilometer": 1e3,
+            "inch": 0.0254,
+            "inches": 0.0254,
+            "foot": 0.3048,
+        },
+    },
+    "FORCE": {
+        **{"newton": 1.0, "n": 1.0, "kn": 1e3, "kilonewton": 1e3, "knewton": 1e3, "dekanewton": 10.0},
+        **{"pound_force": 4.4482216152605, "kilogram_force": 9.80665, "kg_force": 9.80665},
+    },
     "ANGLE": {"radian": 1.0, "radians": 1.0, "rad": 1.0},
-    "MASS": {"kg": 1.0, "kilogram": 1.0, "gram": 1e-3, "pound_mass": 0.45359237},
-    "TIME": {"second": 1.0, "sec": 1.0, "s": 1.0, "millisecond": 1e-3},
+    "MASS": {"kg": 1.0, "kilogram": 1.0, "gram": 1e-3, "tonne": 1e3, "pound_mass": 0.45359237},
+    "TIME": {"second": 1.0, "sec": 1.0, "s": 1.0, "millisecond": 1e-3, "minute": 60.0, "hour": 3600.0},
 }
-"""The allowed units of a [UNITS] section, and their size in SI."""
+"""The allowed units of a [UNITS] section, and their size in SI; words also in the plural, with an `s`."""
 
 _SECTION = re.compile(r"^\s*\[(?P<name>[^\]]+)\]\s*$")
 # A value is a text in quotes, or everything up to a comment.
@@ -35,6 +49,8 @@ SHOWN = 40
 @dataclass(frozen=True)
 class Entry:
     """One line `key = value` of a property file: `section`, `key`, `value`, its `line` from 1.
+
+    `section` and `key` are in capitals, however the file writes them: the format does not distinguish small letters.
 
     `value`: a float if it is one finite number, otherwise the text, which is empty if there is none; `quoted`: whether the text
     was in quotes, which are removed.
@@ -77,11 +93,11 @@ class PropertyFile:
 
         **Raises** `InputError` if there are several with different values.
         """
-        return _one(self.source, key, self._by_key.get(key, []))
+        return _one(self.source, key, self._by_key.get(key.upper(), []))
 
     def holds(self, key: str) -> bool:
         """Whether there is a line of that name, with or without a value."""
-        return key in self._by_key
+        return key.upper() in self._by_key
 
     @cached_property
     def _by_key(self) -> dict[str, list[Entry]]:
@@ -122,6 +138,7 @@ class PropertyFile:
         if entry is None:
             return 1.0
         known, said = PROPERTY_UNITS[quantity], str(entry.value).strip().lower()
+        said = said if said in known or len(said) < 4 else said.removesuffix("s")
         if said not in known:
             raise InputError(
                 f"{self.source}, line {entry.line}: {quantity} = {entry.short_value}: must be one of {', '.join(known)}."
@@ -138,7 +155,7 @@ class PropertyFile:
             if not self.holds(key):
                 raise InputError(f"{self.source}: {key} is not in the file; there are: {', '.join(self._numbers())}.")
             for each in self.entries:
-                if each.key == key:
+                if each.key == key.upper():
                     lines[each.line - 1] = _with_value(lines[each.line - 1], repr(float(value)))
         return parse_property_file("".join(lines), self.source)
 
@@ -187,7 +204,7 @@ def parse_property_file(text: str, source: str = "property file") -> PropertyFil
         if not entry or not section or bare.lstrip().startswith(("$", "!", "{")):
             continue
         value, quoted = _value(entry["value"])
-        entries.append(Entry(section, entry["key"], value, number, quoted))
+        entries.append(Entry(section, entry["key"].upper(), value, number, quoted))
     if not entries:
         raise InputError(f"{source}: no section with entries: this is not a tyre property file (.tir).")
     return PropertyFile(source, lines, tuple(entries))

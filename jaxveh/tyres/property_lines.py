@@ -88,16 +88,12 @@ def _twice(file: PropertyFile) -> Iterator[PropertyFinding]:
 
 
 def _unread(file: PropertyFile, known: set[str]) -> Iterator[PropertyFinding]:
-    """Coefficients of forces and moments that would have an effect but are not read; names in lower case; tables."""
+    """Coefficients of forces and moments that would have an effect but are not read; tables."""
     unread: dict[str, list[kit.Entry]] = {}
     for entry in file.entries:
         if entry.key in known or entry.key in DYNAMIC or isinstance(entry.value, str):
             continue
-        if entry.key.upper() in known:
-            yield PropertyFinding(
-                entry.key, f"in [{entry.section}], line {entry.line}, is not read: write {entry.key.upper()}"
-            )
-        elif entry.section.endswith("COEFFICIENTS") or entry.section.startswith("TURNSLIP"):
+        if entry.section.endswith("COEFFICIENTS") or entry.section.startswith("TURNSLIP"):
             neutral = NEUTRAL.get(entry.key, 1.0 if entry.section.startswith("SCALING") else 0.0)
             if entry.value != neutral:
                 unread.setdefault(entry.section, []).append(entry)

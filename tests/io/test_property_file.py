@@ -1,5 +1,7 @@
 """Property files: every file of the world, its quirks, and back without loss."""
 
+import random
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -200,3 +202,36 @@ def test_entries_that_contradict_each_other():
     file = parse_property_file(SMALL + "X = 'other'\n[INERTIA]\nMASS = 7\nTYRESIDE = 'LEFT'\n[Y]\nTYRESIDE = 'RIGHT'\n")
     about = [finding.about for finding in tyres.check_property_file(file)]
     assert "X" in about and "TYRESIDE" in about
+
+
+def in_other_letters(seed):
+    """The small file with its keys, sections and words in letters drawn from a seed, and its units in the plural or not."""
+    draw = random.Random(seed)
+    recase = lambda text: draw.choice([str.lower, str.upper, str.capitalize])(text)
+    lines = []
+    for line in SMALL.splitlines():
+        key, equals, rest = line.partition("=")
+        if line.startswith("["):
+            line = recase(line)
+        elif equals and not line.startswith("$"):
+            line = recase(key) + equals + rest
+        lines.append(line)
+    text = "\n".join(lines) + "\n"
+    for word in ("'newton'", "'mm'", "'second'", "'meter'"):
+        plural = word[:-1] + "s'" if draw.random() < 0.5 and len(word) > 5 else word
+        text = text.replace(word, recase(plural))
+    return text
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_small_letters_are_the_same_tyre(seed):
+    text = in_other_letters(seed)
+    plain, other = parse_property_file(SMALL), parse_property_file(text)
+    assert text != SMALL
+    expected, found = tyres.from_property_file(plain), tyres.from_property_file(other)
+    assert jax.tree.leaves(found) == jax.tree.leaves(expected)
+    assert tyres.check_property_file(other) == tyres.check_property_file(plain)
+    assert other.find("pdy1") == other.find("PDY1") and other.holds("pDy1")
+    assert other.replace({"pdy1": 0.9}).number("PDY1") == 0.9
+    with pytest.raises(InputError, match="PCY1 has several values"):
+        tyres.from_property_file(parse_property_file(text + "[X]\npcy1 = 1.31\n"))
