@@ -136,8 +136,9 @@ def read_rig_table(
 ) -> RigTable:
     """Read rig data; several files are joined, each as a run. The kind of a file follows from its suffix and its columns:
 
-    - CSV with the names of `COLUMNS` in SI units, or with a unit in the name (`alpha [deg]`) or in a line below the names; missing
-      slips are zero; an empty cell is a missing measurement. Separators and decimal commas are found (`csv_layout.find_layout`).
+    - CSV with the names of `COLUMNS` in SI units, or with a unit in the name (`alpha [deg]`) or in a line below the names;
+      missing slips are zero; an empty cell is a missing measurement. Separators and decimal commas are found
+      (`csv_layout.find_layout`).
     - Files of the Formula SAE Tire Test Consortium (`.dat`, `.txt`, `.mat`, and a `.csv` with its names): see `ttc.read_ttc`.
     - TYDEX (`.tdx`, `.tyd`, `.tydex`): see `tydex.read_tydex`.
 
@@ -146,8 +147,8 @@ def read_rig_table(
     and moments to read.
 
     **Raises** `InputError` like `RigTable`, `read_ttc` and `read_tydex`, for unknown axes, for numbers without a unit that
-    cannot be in SI units (`OTHER_UNITS`), for the consortium's files if FZ is not negative as in SAE's axes and `axes` is not given, and for files with
-    different inputs.
+    cannot be in SI units (`OTHER_UNITS`), for the consortium's files if FZ is not negative as in SAE's axes and `axes` is not
+    given, and for files with different inputs.
     """
     if axes is not None:
         check_one_of("axes", axes, AXES)

@@ -119,8 +119,8 @@ def names_line(path: Path) -> tuple[int, list[str], str] | None:
 def read_ttc(path: str | Path) -> TtcTable:
     """Read a file of the consortium: text, or a MATLAB file.
 
-    The file's own units are used, and the consortium's metric units if it names none, with a `JaxvehWarning`. A missing slip is taken as zero. `SR` is
-    not used as slip ratio: it refers to the loaded radius, so that it is not zero in free rolling.
+    The file's own units are used, and the consortium's metric units if it names none, with a `JaxvehWarning`. A missing slip is
+    taken as zero. `SR` is not used as slip ratio: it refers to the loaded radius, so that it is not zero in free rolling.
 
     **Raises** `InputError`, naming the file and the column, for a file without `FZ`, or with neither `SA` nor `SL`; for
     unknown units, cells that are not numbers, columns of different lengths, and an `SR` that is swept without an `SL`.
