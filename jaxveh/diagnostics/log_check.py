@@ -5,6 +5,7 @@ from __future__ import annotations
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.log_delays import check_delays
 from jaxveh.diagnostics.log_findings import LogFinding, LogView
+from jaxveh.diagnostics.log_names import check_names
 from jaxveh.diagnostics.log_plausibility import check_plausibility
 from jaxveh.diagnostics.log_samples import check_samples
 from jaxveh.diagnostics.log_sampling import check_sampling
@@ -13,6 +14,7 @@ from jaxveh.diagnostics.log_steering import check_steering
 from jaxveh.io import CarSpecification, kit, with_road_steer
 
 CHECKS = (
+    check_names,
     check_sampling,
     check_samples,
     check_units,
@@ -32,8 +34,9 @@ def check_log(recording: Recording, *, car: CarSpecification | None = None) -> l
     and understeer are compared with a linear single track, without it with usual values, and a missing `steer` is computed
     from `steering_wheel` and the file's ratio.
 
-    The checks are: rates, jitter, gaps and missing samples; repeated, frozen and coarse values and spikes; magnitudes; signs and
-    units, from relations between channels; delays, by cross-correlation; steering scale and offset; grip and the car's numbers.
+    The checks are: names that only look like known ones; rates, jitter, gaps and missing samples; repeated, frozen and coarse
+    values and spikes; magnitudes; signs and units, from relations between channels; delays, by cross-correlation; steering scale
+    and offset; grip and the car's numbers.
     They run on the host in NumPy, and change nothing. Simulated truth (`true.` channels) is not checked.
 
     **Raises** `InputError` for a car whose rear wheels are steered, because the checks do not include their angles.

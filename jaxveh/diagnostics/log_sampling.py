@@ -12,6 +12,13 @@ GAP = 2.5
 SLOWEST = 2.0
 """Step above which the motion of a car cannot be observed, s."""
 
+QUICKEST = 2e-5
+"""Step below which no logger records a car's motion, s."""
+
+CLOCKS = {"nanoseconds": 1e-9, "microseconds": 1e-6, "milliseconds": 1e-3, "hours or days": 3600.0}
+USUAL_STEP = 0.01
+"""Other units of time, s, and the step to which a likely unit leads, s."""
+
 LONG = 10.0
 """A gap longer than this is probably not due to a sensor, s."""
 
@@ -44,8 +51,10 @@ def _raster(label: str, time: np.ndarray, missing: float) -> list[LogFinding]:
         return [LogFinding("error", label, f"has only {time.size} sample(s).", {"count": time.size})]
     steps = np.diff(time)
     usual = float(np.median(steps))
-    if usual >= SLOWEST:
-        message = f"has steps of {usual:.4g} s, too long for a car; it looks like milliseconds. Set the unit in the channel map."
+    if not QUICKEST <= usual < SLOWEST:
+        likely = min(CLOCKS, key=lambda unit: abs(np.log(usual * CLOCKS[unit] / USUAL_STEP)))
+        size = "long" if usual >= SLOWEST else "short"
+        message = f"has steps of {usual:.4g} s, too {size} for a car; it looks like {likely}. Set the unit in the channel map."
         return [LogFinding("error", label, message, {"step": usual})]
     gaps = steps > GAP * usual
     jitter = float(np.std(steps[~gaps]) / usual)

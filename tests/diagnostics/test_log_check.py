@@ -483,6 +483,52 @@ def test_time_in_milliseconds_is_an_error(sound):
     assert matching(findings(1e3 * time, channels), "error", "time", "looks like milliseconds")
 
 
+CLOCKS = {"nanoseconds": 1e9, "microseconds": 1e6, "milliseconds": 1e3, "hours": 1 / 3600, "days": 1 / 86400}
+# A step of 1 may be a second, and one of 28 microseconds is that of a logger of vibrations.
+DOUBTFUL = {("milliseconds", 1000.0), ("hours", 10.0)}
+
+
+@pytest.mark.parametrize("unit", CLOCKS)
+def test_a_clock_in_another_unit_is_named(unit):
+    for rate in (10.0, 50.0, 100.0, 250.0, 1000.0):
+        time = CLOCKS[unit] * np.arange(200) / rate
+        found = findings(time, {"v_x": 20 + np.sin(np.arange(200))})
+        told = matching(
+            found, "error", "time", f"it looks like {unit if unit.endswith('seconds') else 'hours or days'}"
+        )
+        assert bool(told) == ((unit, rate) not in DOUBTFUL), (unit, rate)
+
+
+@pytest.mark.parametrize("rate", [1.0, 10.0, 1000.0, 20_000.0])
+def test_a_clock_in_seconds_is_no_fault(rate):
+    time = np.arange(200) / rate
+    assert not matching(findings(time, {"v_x": 20 + np.sin(np.arange(200))}), "error", "time", "looks like")
+
+
+SPELLINGS = {
+    "v_x": ("V_x", "vx", "Vx", "V X"),
+    "yaw_rate": ("YawRate", "yawrate", "Yaw Rate"),
+    "a_y": ("ay", "Ay", "A_Y"),
+}
+
+
+@pytest.mark.parametrize("name", SPELLINGS)
+def test_names_that_look_like_known_ones_are_told_of(sound, name):
+    time, channels = sound
+    for spelling in SPELLINGS[name]:
+        other = {spelling if one == name else one: values for one, values in channels.items()}
+        assert matching(findings(time, other), "warning", spelling, f"is not used: the name of this channel is {name}")
+    # Beside the channel itself it is another one.
+    both = findings(time, {**channels, spelling: channels[name]})
+    assert not matching(both, "warning", spelling, "is not used")
+
+
+def test_a_log_without_any_known_name(sound):
+    time, channels = sound
+    strange = {f"signal {k}": values for k, values in enumerate(channels.values())}
+    assert matching(findings(time, strange, None), "warning", "names", "none of the log's channels has a known name")
+
+
 def test_a_slope_that_is_loosely_followed_is_no_unit(sound):
     """A channel that is zero half of the time has a third of the slope, as km/h would have for m/s."""
     time, channels = plant(sound)

@@ -1,0 +1,49 @@
+"""Programs on logs as loggers write them: what was assumed is one line on stderr, and what is missing is told with its remedy."""
+
+import pytest
+from programs import columns, error_line, run
+
+ABOVE = {"nothing": "", "lines above": "Logger 7\nDriver,A. N. Other\n\n", "comments": "# logger 7\n"}
+
+
+def logger_file(folder, above="", names="Time,Ground Speed,Gyro,Lat Acc,Wheel"):
+    """A log with lines above the names and a line of units below them."""
+    table = columns()
+    rows = zip(
+        table["time"], 3.6 * table["v_x"], 57.29578 * table["yaw_rate"], table["a_y"], table["steer"], strict=True
+    )
+    lines = [names, "s,km/h,deg/s,m/s²,rad", *(",".join(f"{cell:.7f}" for cell in row) for row in rows)]
+    path = folder / "log.txt"
+    path.write_text(above + "\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.filterwarnings("default::jaxveh.JaxvehWarning")
+@pytest.mark.parametrize("above", ABOVE)
+def test_lines_above_the_names_are_told_of(tmp_path, above):
+    (tmp_path / "map.toml").write_text(
+        '[channels]\nv_x = "Ground Speed"\nyaw_rate = "Gyro"\na_y = "Lat Acc"\nsteer = "Wheel"\n'
+    )
+    result = run("check", logger_file(tmp_path, ABOVE[above]), "--channels", tmp_path / "map.toml")
+    assert result.exit_code == 0
+    assert "v_x" in result.stdout and "0 error, 0 warning" in result.stdout, result.stdout
+    lines = result.stderr.strip().splitlines()
+    assert len(lines) == (above == "lines above"), result.stderr
+    assert all(
+        one.startswith("warning: ") and "names are in line 4; the lines above are not read" in one for one in lines
+    )
+
+
+def test_check_tells_of_names_that_look_like_known_ones(tmp_path):
+    result = run("check", logger_file(tmp_path, names="Time,V_x,YawRate,ay,Steer"))
+    assert result.exit_code == 0 and "4 warning" in result.stdout
+    for known in ("v_x", "yaw_rate", "a_y", "steer"):
+        assert f"the name of this channel is {known}." in " ".join(result.stdout.split())
+
+
+@pytest.mark.parametrize("unit", ["grad/s", "Grad/s", "GRAD/S"])
+def test_a_unit_that_is_not_sure_is_refused(tmp_path, unit):
+    path = logger_file(tmp_path, names="time,v_x,yaw_rate,a_y,steer")
+    path.write_text(path.read_text(encoding="utf-8").replace("deg/s", unit), encoding="utf-8")
+    line = error_line(run("check", path))
+    assert f"yaw_rate: unit '{unit}' may be degrees or gradians. Write `deg`" in line
