@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -20,14 +21,26 @@ def read_toml(path: Path) -> dict[str, Any]:
     """Return the contents of a file; raise `InputError` with file and line if it is not TOML."""
     check_readable(path)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: broken TOML: not UTF-8 text (byte {error.start}).") from error
+        raise InputError(f"{path}: broken TOML: not UTF-8 text (byte {error.start}); save it as UTF-8.") from error
+    try:
+        return tomllib.loads(text)
     except (
         ValueError,
         RecursionError,
     ) as error:  # also integers that are too large, and lists that are nested too deeply, for Python
-        raise InputError(f"{path}: broken TOML: {error}.") from error
+        raise InputError(f"{path}: broken TOML: {error}{_line(text, str(error))}.") from error
+
+
+def _line(text: str, told: str) -> str:
+    """Return the line of a message in words, with the form that it should have; "" if the message names none."""
+    found = re.search(r"at line (\d+)", told)
+    lines = text.splitlines()
+    if found is None or not 0 < int(found[1]) <= len(lines):
+        return ""
+    line = shorten(lines[int(found[1]) - 1].strip())
+    return f": {line}; lines are `key = value`, with decimal points, texts in quotes, and # before comments"
 
 
 def check_keys(where: str, table: object, allowed: Iterable[str]) -> None:

@@ -1,6 +1,7 @@
 """The file that describes a car."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -169,3 +170,26 @@ def test_the_shared_car_reads():
     car = io.read_car(shared("ferrari_250lm.toml"))
     assert (car.mass, car.yaw_inertia, car.front_axle_to_cg, car.rear_axle_to_cg) == (982.0, 1605.4, 1.33, 1.07)
     assert (car.front_cornering_stiffness, car.rear_cornering_stiffness) == (70e3, 120e3)
+
+
+MISTYPED = [
+    "mass = 1420,5",
+    "mass = 1420 kg",
+    "mass: 1420",
+    "mass = ",
+    "mass = 1420 // kg",
+    "name = my car",
+    "mass 1420",
+]
+
+
+@pytest.mark.parametrize("line", MISTYPED)
+def test_a_mistyped_line_is_shown(tmp_path, line):
+    path = tmp_path / "car.toml"
+    path.write_text(f"# a car\nyaw_inertia = 2500.0\n{line}\nfront_axle_to_cg = 1.0\n")
+    told = rf"broken TOML: .*line 3.*: {re.escape(repr(line.strip()))}; lines are `key = value`, with decimal points"
+    with pytest.raises(InputError, match=told):
+        io.read_car(path)
+    path.write_bytes(f"{line}\n".encode("utf-16"))
+    with pytest.raises(InputError, match="not UTF-8 text .*; save it as UTF-8"):
+        io.read_car(path)
