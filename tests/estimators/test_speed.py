@@ -247,6 +247,35 @@ def test_satellites_tell_the_radii_and_wheels_alone_do_not_pretend_to():
     assert np.abs((np.asarray(both["v_x"]) / true - 1.0)[t > 15.0]).max() < 0.004
 
 
+def turning_log(sinking, duration=40.0):
+    """Rows of 100 Hz of `CAR`, driven by all wheels, in turns of up to 3.5 m/s^2, whose wheels' radii depend on the load."""
+    t, half = 0.01 * np.arange(round(100 * duration) + 1), 0.5 * 1.5
+    rate, a_y = 1.2 * np.sin(0.8 * t), 3.5 * np.clip(2.0 * np.sin(0.5 * t), -1.0, 1.0)
+    true = 20.0 + 1.5 * (1.0 - np.cos(0.8 * t))
+    left = np.array([1.0, -1.0, 1.0, -1.0])[:, None]
+    # As for a body without roll axis: the load moves by a_y / g times the height over the track.
+    load = 1.0 - left * 2.0 * a_y / 9.81 * CAR.cg_height / 1.5
+    slip = rate / 9.81 / (16.0 * load)
+    wheels = (true - left * half * a_y / true) * (1.0 + sinking * (load - 1.0)) * (1.0 + slip)
+    rng = np.random.default_rng(5)
+    wheels = np.where(np.arange(len(t)) % 2 == 0, wheels + 0.02 * rng.normal(size=wheels.shape), np.nan)
+    late = lambda values, by: np.interp(t - by, t, values)
+    wheels = np.stack([late(one, 0.03) for one in wheels])
+    a_x = 1.048 * late(rate, 0.025) + 0.1 + 0.05 * rng.normal(size=len(t))
+    return t, true, log_of("slip_aware", t, wheels, a_x=a_x, a_y=a_y, yaw_rate=a_y / true, steer=0.0)
+
+
+@pytest.mark.parametrize("sinking", [0.0, 0.004, 0.01, 0.017])
+def test_tyres_that_sink_more_or_less_are_no_offset_of_the_accelerometer(sinking):
+    t, true, log = turning_log(sinking)
+    car = dataclasses.replace(CAR, front_drive=0.5, track_front=1.5, track_rear=1.5)
+    said = speed.estimate(car, log)
+    late = t > 10.0
+    assert np.abs(np.asarray(said["v_x"]) / true - 1.0)[late].max() < 0.004
+    offset, std = np.asarray(said["a_x_offset"]), np.asarray(said.std.a_x_offset)
+    assert (np.abs(offset - 0.1) < 2.0 * std)[late].all()
+
+
 def test_silence_is_not_known_and_standing_is():
     t, _, log = slip_aware_log()
     silent = {name: np.where(t > 10.0, np.nan, log[name]) for name in log.names}

@@ -41,15 +41,18 @@ from jaxveh.vehicles import GRAVITY
 
 
 class SlipAware(AbstractMethod):
-    """An error-state filter of rolling speed, force, slope, the accelerometer's offset and gain, radii and slip softness.
+    """An error-state filter of rolling speed, force, slope, the accelerometer's offset and gain, radii, softness and sinking.
 
         dv_x/dt = force + v_y yaw_rate - slope,        a_x = (1 + gain) force + offset
         wheel   = (1 + radius) (1 + sink) (1 + slip) (speed at the wheel's position, along the wheel's plane)
         slip    = exp(softness) F / (K F_z) - f_r / K,      F from the torques if the log has them, else from `force`
 
     `gain` models that an accelerometer on the body pitches with it: g times the file's `pitch_gradient`, or that of usual cars.
-    Load transfer also changes the rolling radius (a third of the tyre's `compression`, over the radius). Lateral velocities are
-    those of a steady turn with the file's cornering stiffnesses.
+    A wheel with more load rolls with a smaller radius: `sink = sinking (F_z / F_z at rest - 1)`. It is a state, because tyres
+    differ: 0.017 for a belt whose radius decreases by a third of the tyre's compression, 0.003 to 0.005 for a radial tyre by
+    Pacejka's curve of the effective rolling radius. With a wrong number, wheels that differ in a turn would be taken for the slip
+    of a larger force, and the accelerometer for one with an offset. Lateral velocities are those of a steady turn with the file's
+    cornering stiffnesses.
 
     **Trust**: a wheel is weighted by `(gate / |e|)^8` where its normalised innovation e is beyond `gate`, and likewise where its
     acceleration differs from the car's by more than `rate_gate` (m/s^2; four times that without an accelerometer). Trust is lost
@@ -73,7 +76,7 @@ class SlipAware(AbstractMethod):
     car: SpeedCar
     spreads: Spreads = eqx.field(default_factory=Spreads)
     gain: jax.Array = parameter("-", scale=0.03, default=0.048)
-    compression: jax.Array = positive("-", default=0.05)
+    sinking: jax.Array = parameter("-", scale=0.01, default=0.01)
     gate: jax.Array = positive("-", default=3.0)
     rate_gate: jax.Array = positive("m/s^2", default=2.0)
     calm: jax.Array = positive("-", default=0.1)
@@ -100,10 +103,10 @@ class SlipAware(AbstractMethod):
         count = jnp.sum(there.astype(t.dtype))
         v_x = jnp.sum(jnp.where(there, wheels, 0.0)) / jnp.maximum(count, 1.0)
         s, zero = self.spreads, jnp.zeros_like(t)
-        mean = SpeedState(v_x, zero, zero, zero, zero + self.gain, *[zero] * 7)
+        mean = SpeedState(v_x, zero, zero, zero, zero + self.gain, *[zero] * 7, zero + self.sinking)
         std = SpeedState(
             jnp.where(count > 0, 0.3 + 0.03 * jnp.abs(v_x), 30.0), 3.0, s.slope, s.offset, s.gain,
-            0.5 * s.radius, *[0.0 * s.radius] * 4, *[s.softness] * 2,
+            0.5 * s.radius, *[0.0 * s.radius] * 4, *[s.softness] * 2, s.sinking,
         )  # fmt: skip
         stack = lambda state: jnp.stack([jnp.asarray(one, t.dtype) for one in state])
         belief = Belief(stack(mean), jnp.diag(jnp.square(stack(std))) + own_radii(s.radius))
@@ -167,7 +170,7 @@ class SlipAware(AbstractMethod):
             # With a wrong radius the wheels' rate is slightly different, too; the accelerometer's gain contains that.
             rolled = x.rolled + step * self._acceleration(memory, x)
             soft = [back * x.softness_front, back * x.softness_rear]
-            return jnp.stack([rolled, x.force, falls * x.slope, *x[3:10], *soft])
+            return jnp.stack([rolled, x.force, falls * x.slope, *x[3:10], *soft, x.sinking])
 
         lost = memory.t - memory.lost > self.patience
         wander = s.speed_walk + jnp.where(lost, 1.0, 0.0)
@@ -175,7 +178,18 @@ class SlipAware(AbstractMethod):
         none = 0.0 * s.gain
         slope_walk = jnp.where(felt, s.slope_walk, 0.0)
         # The walk of each wheel's own radius is added below.
-        walks = [wander, s.force_walk, slope_walk, s.offset_walk, none, 0.5 * s.radius_walk, *[none] * 4, soft, soft]
+        walks = [
+            wander,
+            s.force_walk,
+            slope_walk,
+            s.offset_walk,
+            none,
+            0.5 * s.radius_walk,
+            *[none] * 4,
+            soft,
+            soft,
+            none,
+        ]
         noise = jnp.diag(jnp.square(jnp.stack(walks))) + own_radii(s.radius_walk)
         return predict(memory.belief, move, step * noise)
 
@@ -220,7 +234,7 @@ class SlipAware(AbstractMethod):
         front, rear = (slip_stiffness(c, n) for c, n in zip(car.cornering_stiffnesses, car.loads, strict=True))
         softness = front_rear(x.softness_front, x.softness_rear)
         slip = jnp.exp(softness) * share / front_rear(front, rear)
-        sink = self.compression / 3.0 * (load / front_rear(*car.loads) - 1.0)
+        sink = x.sinking * (load / front_rear(*car.loads) - 1.0)
         rolling = along * (1.0 + mean[RADII] + sink)
         return Said(rolling + along * slip, rolling, slip, share)
 

@@ -23,6 +23,9 @@ FRONT = np.array([True, True, False, False])
 RADII = slice(6, 10)
 """Indices of the wheels' own radii in the state."""
 
+STATES = 13
+"""Length of the state."""
+
 HELD = ("a_x", "a_y", "yaw_rate", "steer", "drive_torque", *(f"brake_torque_{at}" for at in AT))
 """Channels that are held between two samples."""
 
@@ -43,7 +46,8 @@ class SpeedState(NamedTuple):
     """`rolled`: mean speed of wheels without slip, `(1 + radius) v_x` (m/s); `force`: force of tyres and air over the mass
     (m/s^2); `slope`: gravity along the road (m/s^2, uphill positive); `offset` (m/s^2) and `gain` (-) of the accelerometer;
     `radius` (-): common relative error of all wheels' speeds by their radii, `radius_fl` to `radius_rr` (-): that of each wheel
-    beyond it; `softness_front`, `softness_rear` (-): logarithm of the slip of an axle's tyres over that of the file.
+    beyond it; `softness_front`, `softness_rear` (-): logarithm of the slip of an axle's tyres over that of the file; `sinking`
+    (-): the relative decrease of a wheel's rolling radius if its load doubles.
 
     The wheels' speed is a state instead of the car's, so that no wheel makes the common radius error observable. (A filter of
     v_x, linearised about a changing speed, would soon consider it known.)"""
@@ -60,6 +64,7 @@ class SpeedState(NamedTuple):
     radius_rr: Any
     softness_front: Any
     softness_rear: Any
+    sinking: Any
 
     @property
     def v_x(self) -> Any:
@@ -92,6 +97,7 @@ class Spreads(eqx.Module):
     radius_walk: jax.Array = positive("1/sqrt(s)", default=1e-4)
     softness: jax.Array = positive("-", default=0.35)
     softness_time: jax.Array = positive("s", default=300.0)
+    sinking: jax.Array = positive("-", default=0.01)
     force_walk: jax.Array = positive("m/s^2/sqrt(s)", default=6.0)
     speed_walk: jax.Array = positive("m/s/sqrt(s)", default=0.02)
     a_x: jax.Array = positive("m/s^2", default=0.1)
@@ -146,7 +152,7 @@ def beyond(far: Any) -> Any:
 
 
 def own_radii(std: Any) -> Any:
-    """The covariance (12, 12) of a state in which only the four wheels' own radii are uncertain, with equal standard deviations
-    `std` less that of their mean."""
+    """The covariance (`STATES`, `STATES`) of a state in which only the four wheels' own radii are uncertain, with equal standard
+    deviations `std` less that of their mean."""
     free = jnp.eye(4, dtype=std.dtype) - 0.25
-    return jnp.zeros((12, 12), std.dtype).at[RADII, RADII].set(free * jnp.square(std))
+    return jnp.zeros((STATES, STATES), std.dtype).at[RADII, RADII].set(free * jnp.square(std))
