@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,6 +12,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.scipy.linalg import block_diag
 
 from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, put, strong
 from jaxveh._core.recording import Recording
@@ -47,34 +50,48 @@ class Members(eqx.Module):
         return jax.tree.map(lambda mean, std, at: size(std, mean - at), means, stds, centre)
 
 
-def members_of_fit(fit: Fit) -> Members:
-    """Models around a fit, whose parameters have its covariance."""
-    return Members(_spread(fit.model, fit.chosen, np.asarray(fit.unconstrained), np.asarray(fit.covariance)), WIDER)
+def members_of_fit(fit: Fit, unfitted: Mapping[str, float] | None = None) -> Members:
+    """Models around a fit, whose parameters have its covariance. `unfitted`: names of parameters of the system that
+    were not fitted and are not known either, and their standard deviations."""
+    centre, covariance = np.asarray(fit.unconstrained), np.asarray(fit.covariance)
+    return Members(_spread(fit.model, fit.chosen, centre, covariance, unfitted or {}), WIDER)
 
 
-def members_of_prior(model: StateSpace, where: Where, prior: Mapping[str, float]) -> Members:
-    """Models around one that was not fitted to any log: its parameters have the prior's relative spreads."""
+def members_of_prior(
+    model: StateSpace, where: Where, prior: Mapping[str, float], unfitted: Mapping[str, float] | None = None
+) -> Members:
+    """Models around one that was not fitted to any log: its parameters have the prior's relative spreads. `unfitted` as in
+    `members_of_fit`."""
     chosen = fitting.scalar_parameters(model, where)
     values = pick(model, chosen)
     spread = np.stack([np.asarray(one) for one in prior_spread(chosen, values, prior)])
-    return Members(_spread(model, chosen, np.asarray(fitting.on_line(chosen, values)), np.diag(spread**2)), TOLD)
+    centre = np.asarray(fitting.on_line(chosen, values))
+    return Members(_spread(model, chosen, centre, np.diag(spread**2), unfitted or {}), TOLD)
 
 
-def _spread(model: StateSpace, chosen: tuple[Parameter, ...], centre: np.ndarray, covariance: np.ndarray) -> StateSpace:
-    """Models on a leading axis whose `chosen` parameters, on the real line, have this mean and covariance: `z + L h`, where h
-    are the rows of signs of a Hadamard matrix with distinct columns, so that both are exact and no member lies far out."""
+def _spread(
+    model: StateSpace, chosen: tuple[Parameter, ...], centre: np.ndarray, covariance: np.ndarray, unfitted: Mapping[str, float]
+) -> StateSpace:  # fmt: skip
+    """Models on a leading axis whose `chosen` parameters, on the real line, have this mean and covariance, and whose `unfitted`
+    ones vary independently of them about the model's: `z + L h`, where h are rows of signs with orthogonal columns, so that both
+    are exact and no member lies far out."""
     root = np.linalg.cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(len(centre)))
-    points = jnp.asarray(centre + _hadamard(len(centre)) @ root.T, centre.dtype)
+    if unfitted:
+        more = fitting.scalar_parameters(model, lambda model: [getattr(model.system, name) for name in unfitted])
+        chosen = chosen + more
+        centre = np.append(centre, fitting.on_line(more, pick(model, more)))
+        root = block_diag(root, np.diag([*unfitted.values()]))
+    points = jnp.asarray(centre + _signs(len(centre)) @ root.T, centre.dtype)
     return eqx.filter_vmap(lambda point: put(model, chosen, fitting.in_units(chosen, point)))(points)
 
 
-def _hadamard(columns: int) -> np.ndarray:
-    """Signs (n, columns), n a power of two, whose columns are orthogonal to each other and to a constant (J. Sylvester
-    1867)."""
-    signs = np.ones((1, 1))
-    while len(signs) < columns + 1:
-        signs = np.block([[signs, signs], [signs, -signs]])
-    return signs[:, 1 : columns + 1]
+def _signs(columns: int) -> np.ndarray:
+    """Signs (n, columns), n little more than `columns`, whose columns are orthogonal to each other and to a constant: the squares
+    modulo a prime that is 3 modulo 4, shifted from row to row (R. Paley 1933; R. Plackett & J. Burman 1946)."""
+    primes = (q for q in itertools.count(3, 4) if all(q % k for k in range(2, math.isqrt(q) + 1)))
+    prime = next(q for q in primes if q >= columns)
+    first = np.where(np.isin(np.arange(prime), np.arange(prime) ** 2 % prime), 1.0, -1.0)
+    return np.stack([*(np.roll(first, k) for k in range(prime)), -np.ones(prime)])[:, :columns]
 
 
 def estimate_with_members(

@@ -5,7 +5,9 @@ import functools
 import types
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from shared_data import shared
@@ -334,6 +336,31 @@ def test_a_class_in_place_of_a_filter_is_named_with_bands_too(smoothed):
         )
 
 
+def test_an_a_y_that_is_a_little_late_is_in_the_bands():
+    """The integral of a late a_y lacks the delay times a_y; the bands hold 10 ms of it."""
+    recording, delay = log(1500).without("v_y"), 0.01
+    time = np.asarray(recording.time)
+    late = recording.replace(a_y=np.interp(time - delay, time, np.asarray(recording["a_y"])))
+    said = lambda source, log: np.asarray(estimators.sideslip.estimate(source, log).mean.v_y)[100:]
+    model = estimators.sideslip.model(CAR)
+    corrected = eqx.tree_at(lambda model: model.system.a_y_delay_error, model, jnp.asarray(delay))
+    punctual = said(model, recording)
+    lacks, left = (np.std(said(one, late) - punctual) for one in (model, corrected))
+    assert lacks > 0.5 * delay * np.std(np.asarray(recording["a_y"])) and left < 0.3 * lacks
+    spread = parameter_bands.members_of_prior(
+        model, lambda model: model.system.grip, {"grip": 1e-6}, estimators.sideslip.UNFITTED
+    ).models.system.a_y_delay_error
+    np.testing.assert_allclose([spread.mean(), spread.std()], [0.0, delay], atol=1e-12)
+
+
+@pytest.mark.parametrize("columns", [1, 2, 3, 15, 16, 24])
+def test_signs_of_members_are_orthogonal(columns):
+    signs = parameter_bands._signs(columns)
+    assert columns < len(signs) <= 2 * columns + 2 and set(np.unique(signs)) == {-1.0, 1.0}
+    np.testing.assert_array_equal(signs.T @ signs, len(signs) * np.eye(columns))
+    np.testing.assert_array_equal(signs.sum(axis=0), 0.0)
+
+
 @pytest.mark.thorough
 def test_bands_know_that_parameters_are_uncertain(monkeypatch):
     fit = calibrated().fit
@@ -364,6 +391,7 @@ def test_bands_of_a_car_at_its_word_are_as_wide_as_its_file_is_worth(monkeypatch
     """Where only the stiffness is not known, they are those of the stiffest and the softest car that the file may mean."""
     recording = log(1500).without("v_y")
     monkeypatch.setattr(estimators.sideslip, "SPREADS", dict.fromkeys(estimators.sideslip.SPREADS, 1e-4))
+    monkeypatch.setattr(estimators.sideslip, "UNFITTED", {})
     sure = estimators.sideslip.estimate(estimators.sideslip.model(CAR), recording)
     known = estimators.sideslip.estimate(CAR, recording)
     np.testing.assert_allclose(known.std.sideslip, sure.std.sideslip, rtol=1e-2)
