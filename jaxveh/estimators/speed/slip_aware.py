@@ -103,10 +103,10 @@ class SlipAware(AbstractMethod):
         count = jnp.sum(there.astype(t.dtype))
         v_x = jnp.sum(jnp.where(there, wheels, 0.0)) / jnp.maximum(count, 1.0)
         s, zero = self.spreads, jnp.zeros_like(t)
-        mean = SpeedState(v_x, zero, zero, zero, zero + self.gain, *[zero] * 7, zero + self.sinking)
+        mean = SpeedState(v_x, zero, zero, zero, zero + self.gain, *[zero] * 7, sinking=zero + self.sinking)
         std = SpeedState(
             jnp.where(count > 0, 0.3 + 0.03 * jnp.abs(v_x), 30.0), 3.0, s.slope, s.offset, s.gain,
-            0.5 * s.radius, *[0.0 * s.radius] * 4, *[s.softness] * 2, s.sinking,
+            0.5 * s.radius, *[0.0 * s.radius] * 4, *[s.softness] * 2, sinking=s.sinking,
         )  # fmt: skip
         stack = lambda state: jnp.stack([jnp.asarray(one, t.dtype) for one in state])
         belief = Belief(stack(mean), jnp.diag(jnp.square(stack(std))) + own_radii(s.radius))
