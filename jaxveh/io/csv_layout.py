@@ -62,12 +62,23 @@ def find_layout(path: Path, told: ChannelMap | None) -> Layout:
         raise InputError(
             f"{path}: is not text in {encoding} ({error}); correct `encoding` in the channel map."
         ) from error
-    said = _SEPARATOR_LINE.fullmatch(lines[0]) if lines else None
+    if all(map(_is_blank, lines)):
+        raise InputError(f"{path}: has no line with a content among the first {HEAD}.")
+    try:
+        return _layout(path, lines, encoding, (remark,) if remark else (), told)
+    except csv.Error as error:
+        raise InputError(f"{path}: is no table of text ({error}). Correct the line, or name the separator.") from error
+
+
+def _layout(
+    path: Path, lines: Sequence[str], encoding: str, assumed: tuple[str, ...], told: ChannelMap | None
+) -> Layout:
+    said = _SEPARATOR_LINE.fullmatch(lines[0])
     separator = (told.separator if told else None) or (said["separator"] if said else None)
     separator = BLANKS if separator == " " else separator
     names, units, first, separator = _places(path, lines, separator, told.names_line if told else None)
     headings = _names(lines[names], separator, path, names)
-    remarks = [remark] if remark else []
+    remarks = list(assumed)
     above = [line for line in lines[:names] if line.strip() and not line.startswith(COMMENT)]
     if len(above) > (said is not None) and not (told and told.names_line):
         remarks.append(f"the columns' names are in line {names + 1}; the lines above are not read")
@@ -131,8 +142,7 @@ def _places(
             if counts and (found := _above(lines, first, one, counts)) is not None:
                 return *found, first, one
     # What is none of this is read as one line of names, for a message about the rows below.
-    line = lines[0] if lines else ""
-    return 0, None, 1, separator or max(",;\t", key=line.count)
+    return 0, None, 1, separator or max(",;\t", key=lines[0].count)
 
 
 def _alike(lines: Sequence[str], first: int, separator: str) -> tuple[int, ...]:
@@ -144,12 +154,14 @@ def _alike(lines: Sequence[str], first: int, separator: str) -> tuple[int, ...]:
     for line in lines[first:]:
         if not _is_blank(line):
             rows.append(_split(line, separator))
+            if not _is_row(rows[-1]):
+                return ()
         elif not rows:
             return ()
         if len(rows) == ALIKE:
             break
     counts = {len(cells) for cells in rows}
-    if len(counts) != 1 or not all(map(_is_row, rows)):
+    if len(counts) != 1:
         return ()
     count = counts.pop()
     both = (count, count - 1) if all(cells[-1] == "" for cells in rows) else (count,)
@@ -174,10 +186,7 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _names(line: str, separator: str, path: Path, number: int) -> list[str]:
-    try:
-        names = _split(line.removeprefix("#"), separator)
-    except csv.Error as error:
-        raise InputError(f"{path}: line {number + 1}: {error}.") from error
+    names = _split(line.removeprefix("#"), separator)
     if not names or all(is_number(name) for name in names):
         raise InputError(f"{path}: line {number + 1} holds numbers only; the first line must name the columns.")
     return names

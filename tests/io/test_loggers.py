@@ -250,3 +250,21 @@ def test_a_dat_file_may_be_mdf(tmp_path):
 def test_what_is_not_read_is_told_with_what_to_do(tmp_path, suffix):
     with pytest.raises(InputError, match=r"is not read: (save|export|decode|convert|load) .*A log must end in one of"):
         io.read_recording(tmp_path / f"log{suffix}")
+
+
+NO_TABLES = {
+    "blank lines": ("\n\n \n", "has no line with a content"),
+    "blank cells": (",,\n,,\n", "has no line with a content"),
+    "a long name": (f"time,{'n' * 200_000}\n0,1\n", "is no table of text"),
+    "a long cell": (f"time,v_x\n0,{'9' * 200_000}\n", "is no table of text"),
+    "numbers": ("0.0,1.0\n0.1,1.0\n", "line 1 holds numbers only"),
+    "words": ("hello\nworld\n", "no time column"),
+    "zero bytes": ("t\0i\0m\0e\0", "contains zero bytes"),
+}
+
+
+@pytest.mark.parametrize("case", NO_TABLES)
+def test_what_is_no_table_is_told(tmp_path, case):
+    text, words = NO_TABLES[case]
+    with pytest.raises(InputError, match=words):
+        read(tmp_path / "log.csv", text)
