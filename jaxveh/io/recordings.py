@@ -36,15 +36,15 @@ def open_dat(path: Path, channels: ChannelMap | None) -> Log:
 
 _OPEN: dict[str, Callable[[Path, ChannelMap | None], Log]] = {
     ".csv": open_csv,
-    ".txt": open_csv,
-    ".tsv": open_csv,
-    ".dat": open_dat,
     ".parquet": open_parquet,
     ".mf4": open_mdf,
     ".mdf": open_mdf,
     ".mat": open_mat,
     ".mcap": open_mcap,
     ".nc": open_netcdf,
+    ".txt": open_csv,
+    ".tsv": open_csv,
+    ".dat": open_dat,
 }
 _WRITE = {
     ".csv": write_csv,
@@ -126,7 +126,7 @@ def _read(
     path = Path(path)
     if (advice := _ELSEWHERE.get(path.suffix.lower())) is not None:
         raise InputError(
-            f"{path}: suffix {path.suffix!r} is not read: {advice}. A log must end in one of {', '.join(_OPEN)}."
+            f"{path}: suffix {path.suffix!r} is not read: {advice}; a log must end in one of {', '.join(_OPEN)}."
         )
     suffix = check_suffix(path, _OPEN, "log")
     check_readable(path)

@@ -47,6 +47,7 @@ NO_RESULT = {
     "Runs": "of a study over many runs, a NamedTuple of arrays",
     "InnovationPoints": "what a figure draws",
     "LaggedLoads": "its time is a time constant",
+    "Channel": "its time is the name of a column",
     "ChannelMap": "its time is the name of a column",
     "ChangingSpeed": "a manoeuvre",
     "Replay": "a manoeuvre",

@@ -248,7 +248,9 @@ def test_a_dat_file_may_be_mdf(tmp_path):
 
 @pytest.mark.parametrize("suffix", [".xlsx", ".vbo", ".ld", ".blf", ".asc", ".bag", ".h5", ".pkl", ".feather"])
 def test_what_is_not_read_is_told_with_what_to_do(tmp_path, suffix):
-    with pytest.raises(InputError, match=r"is not read: (save|export|decode|convert|load) .*A log must end in one of"):
+    with pytest.raises(
+        InputError, match=r"is not read: (save|export|decode|convert|load) .*; a log must end in one of"
+    ):
         io.read_recording(tmp_path / f"log{suffix}")
 
 

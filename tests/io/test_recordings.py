@@ -160,7 +160,7 @@ def test_files_that_are_not_what_they_seem(tmp_path):
     with pytest.raises(InputError, match=r"is not UTF-8 text \(byte 47\), nor Windows-1252"):
         io.read_recording(tmp_path / "late.csv")
     with pytest.raises(
-        InputError, match=r"suffix '.xlsx' is not read: save the sheet as CSV. A log must end in one of .csv"
+        InputError, match=r"suffix '.xlsx' is not read: save the sheet as CSV; a log must end in one of .csv"
     ):
         io.read_recording(tmp_path / "log.xlsx")
     with pytest.raises(InputError, match=r"nothing\.csv: cannot be read"):
