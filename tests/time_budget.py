@@ -6,7 +6,8 @@ runs, the others are left to `-m full`. Each function starts at a case of its ow
 class (every filter, every method) meet some test, and a file alone runs the cases that it runs among all. Cases that take
 longer than `LONGEST` are `thorough`, the quickest functions of a file first, for `LONG_BUDGET` seconds a file; the others are
 left to `-m full` too. A case that alone takes much longer than its function's others is on record by its own name: it is long,
-the others are not. A function that is not on record runs whole, so that a new one is never left out.
+the others are not. A function that is not on record runs whole, so that a new one is never left out, and so does one that is
+marked `whole`: each of its cases is the only one that looks at a member's numbers.
 
 `JAXVEH_SECONDS=1 python -m pytest` records them again.
 
@@ -73,7 +74,7 @@ def keep_to_budget(items):
     """Mark as `full` the cases beyond a function's budget, and as `thorough` what is left of those that take too long."""
     seconds, cases, long = json.loads(RECORD.read_text()), {}, {}
     for item in items:
-        if any(item.get_closest_marker(mark) for mark in LEFT_OUT):
+        if any(item.get_closest_marker(mark) for mark in (*LEFT_OUT, "whole")):
             continue
         name, own = function_of(item.nodeid), item.nodeid.removeprefix("tests/")
         if own != name and own in seconds:

@@ -83,6 +83,16 @@ def test_a_file_alone_runs_the_cases_that_it_runs_among_all(tmp_path, monkeypatc
     assert not any(item.marks for item in files["a"][40:])
 
 
+def test_what_is_marked_whole_runs_whole(tmp_path, monkeypatch):
+    monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
+    time_budget.RECORD.write_text(json.dumps({"a.py::slow": 3.0}))
+    items = [Item(f"tests/a.py::slow[{k}]") for k in range(40)]
+    for item in items:
+        item.get_closest_marker = lambda name: name == "whole" or None
+    time_budget.keep_to_budget(items)
+    assert not any(item.marks for item in items)
+
+
 def of_a_product(function, k, **indices):
     item = Item(f"tests/a.py::f{function}[{k}]")
     item.callspec = SimpleNamespace(indices=indices or {"x": k})

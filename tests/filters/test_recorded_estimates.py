@@ -1,6 +1,6 @@
 """What every filter makes of a short recording, by every setting that changes it, as recorded.
 
-They all are `thorough`, whatever they take: of many filters no other test there runs a step.
+They run by default, whatever they take: of many filters no other test there runs a step.
 Particles, too: their draws are of a key, and rounding moves an ancestor about once in a thousand million draws.
 """
 
@@ -13,6 +13,8 @@ from test_every_filter import CHANGES, FILTERS, GROUPS, MODELS, N, batch, noisie
 
 from jaxveh import Recording, filters, numerics, statespace
 from jaxveh.filters import SquareRoot
+
+pytestmark = pytest.mark.whole
 
 FEW = filters.ParticleFilter(N, threshold=0.6)
 MORE = {
@@ -67,7 +69,6 @@ def short(filter_, model, rows, key):
     return jax.tree.map(lambda leaf: leaf[2::3] if leaf.ndim else leaf, kept)
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize("name", MAKERS)
 def test_estimates_are_those_recorded(name):
     filter_, linear = MAKERS[name](), name in FILTERS and FILTERS[name].linear
@@ -91,7 +92,6 @@ SMOOTHERS = {
 }
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize("name", SMOOTHERS)
 def test_smoothed_estimates_are_those_recorded(name):
     filter_, method, lag = SMOOTHERS[name]

@@ -8,6 +8,8 @@ from test_every_device import DEVICES, heard
 
 from jaxveh import sensors
 
+pytestmark = pytest.mark.whole
+
 MADE = {
     "production": sensors.production_car,
     "production, wheels": lambda: sensors.production_car(0.31, steering_ratio=15.5, gnss=False),

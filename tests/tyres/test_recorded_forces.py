@@ -13,6 +13,8 @@ from shared_data import shared
 from jaxveh import tyres
 from jaxveh.tyres import Contact
 
+pytestmark = pytest.mark.whole
+
 
 def file(name):
     return lambda: tyres.from_property_file(shared("tyres") / name)

@@ -19,6 +19,8 @@ from jaxveh import InputError, vehicles
 from jaxveh.roads import LEVEL
 from jaxveh.vehicles.sets import commonroad_cars
 
+pytestmark = pytest.mark.whole
+
 GIVEN = {
     name: maker
     for name, maker in {**vars(commonroad_cars), **vars(vehicles.sets), **vars(vehicles)}.items()
