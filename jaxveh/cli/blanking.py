@@ -10,6 +10,7 @@ import numpy as np
 from jaxveh import InputError, Recording
 from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
+from jaxveh.diagnostics import kit
 from jaxveh.estimators import sideslip
 
 SEEN = (*(need.channel for need in sideslip.needs), "steer")
@@ -76,8 +77,8 @@ def split(
     time = np.asarray(recording.time)
     if not span[1] <= time[-1]:
         raise InputError(
-            f"--calibrate: the span ends at {min(span[1], time[-1]):g} s and leaves nothing to estimate; the log runs from "
-            f"{time[0]:g} to {time[-1]:g} s."
+            f"--calibrate: the span ends at {kit.shown_time(min(span[1], time[-1]))} s and leaves nothing to estimate; "
+            f"the log runs from {kit.shown_time(time[0], time[-1])} s."
         )
     rest = recording.between(span[1], np.inf)
     inside = _visible_channels(recording.between(*span), tuple(calibrate_on), None if truth in calibrate_on else truth)

@@ -15,6 +15,7 @@ from jaxveh.cli import options
 from jaxveh.cli.console import results
 from jaxveh.cli.drives import COLOURS
 from jaxveh.cli.output import check_report, make_folder, write_numbers
+from jaxveh.diagnostics import kit
 
 ORDER = tuple(COLOURS)
 
@@ -66,9 +67,9 @@ def _summary(recording: Recording) -> dict:
 
 def _print(log: Path, recording: Recording, findings) -> None:
     console, about = results(), _summary(recording)
-    step = "" if about["median_step_s"] is None else f", every {about['median_step_s']:g} s"
+    step = "" if about["median_step_s"] is None else f", every {about['median_step_s']:.4g} s"
     rows, start, end = about["rows"], about["start_s"], about["end_s"]
-    console.print(Text(log.name, "bold"), f"{rows} rows from {start:g} to {end:g} s{step}")
+    console.print(Text(log.name, "bold"), f"{rows} rows from {kit.shown_time(start, end)} s{step}")
     lines = Table.grid(padding=(0, 2))
     lines.add_column(justify="right")
     lines.add_column(no_wrap=True)

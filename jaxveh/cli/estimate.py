@@ -20,6 +20,7 @@ from jaxveh.cli.drives import Drive, read_drives
 from jaxveh.cli.estimate_figures import draw
 from jaxveh.cli.estimate_report import check_report_page, reported_log, write_report
 from jaxveh.cli.output import check_product, check_products, check_report, write_numbers
+from jaxveh.diagnostics import kit
 
 MCAP_SUFFIX = io.kit.MCAP_SUFFIX
 
@@ -248,7 +249,7 @@ def _job(choice: Choice, drive: Drive, product: Path) -> Job:
     time = drive.recording.time
     if product.suffix.lower() == MCAP_SUFFIX and time[0] < 0:
         raise InputError(
-            f"-o {product}: time stamps must be at least zero, but the log begins at {time[0]:g} s: write another format."
+            f"-o {product}: time stamps must be at least zero, but the log begins at {time[0]:.15g} s: write another format."
         )
     span = options.span_of(choice.calibrate, float(time[0]), float(time[-1]))
     parts = split(drive.recording, span, choice.calibrate_on, choice.truth)
@@ -288,7 +289,7 @@ def _say_source(choice: Choice, calibration: Any, reason: str | None) -> None:
 def _source_in_words(choice: Choice, calibration: Any, reason: str | None) -> str:
     if calibration is None:
         return f"Nothing was calibrated, the values of the car file are used: {reason}."
-    spans = "; ".join(f"{span.log or 'a log'} {span.start:g} to {span.end:g} s" for span in calibration.spans)
+    spans = "; ".join(f"{one.log or 'a log'} {kit.shown_time(one.start, one.end)} s" for one in calibration.spans)
     if choice.calibration is not None:
         return f"Calibrated by {choice.calibration}, on {spans}."
     if choice.calibrate is not None:
@@ -306,7 +307,7 @@ def _conclude(choice: Choice, job: Job, found: Any, calibration: Any, car: io.Ca
         title = f"Score over the estimated rows of {job.drive.log.name}, by the names of the JSON file"
         table(title, ("name", "value"), rows)
     time = np.asarray(found.time)
-    results().print(f"{job.product}: {time.size} rows from {time[0]:g} to {time[-1]:g} s", markup=False)
+    results().print(f"{job.product}: {time.size} rows from {kit.shown_time(time[0], time[-1])} s", markup=False)
     figures = []
     if job.out is not None:
         figures = draw(found, job.drive.recording, job.parts.truth, choice.truth, car, calibration, job.span, job.out)

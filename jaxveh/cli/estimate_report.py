@@ -17,6 +17,7 @@ from jaxveh.cli.console import number, spread
 from jaxveh.cli.drives import COLOURS, Drive
 from jaxveh.cli.estimate_figures import beside
 from jaxveh.cli.output import check_product
+from jaxveh.diagnostics import kit
 
 BASELINE = "open_loop_"
 WORDS = {
@@ -88,7 +89,7 @@ def write_report(
 
 def _log_in_words(drive: Drive) -> str:
     time = np.asarray(drive.recording.time)
-    return f"{drive.log} ({time.size} rows, {time[0]:g} to {time[-1]:g} s)"
+    return f"{drive.log} ({time.size} rows, {kit.shown_time(time[0], time[-1])} s)"
 
 
 def _car_in_words(car: io.CarSpecification) -> str:

@@ -14,6 +14,7 @@ from jaxveh.cli.console import progress, results
 from jaxveh.cli.drives import Drive, read_drives
 from jaxveh.cli.estimate import print_fitted
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
+from jaxveh.diagnostics import kit
 
 PRODUCT = typer.Option(
     "-o", metavar="FILE", show_default=False, help="The calibration file (.toml), for jaxveh estimate --calibration."
@@ -70,7 +71,7 @@ def fit(
     print_fitted(calibration)
     if (words := sideslip.reference_in_words(calibration, uses)) is not None:
         results().print(words)
-    where = ", ".join(f"{one.start:g} to {one.end:g} s of {one.log}" for one in calibration.spans)
+    where = ", ".join(f"{kit.shown_time(one.start, one.end)} s of {one.log}" for one in calibration.spans)
     results().print(f"{product}: fitted to {where}", markup=False)
     figures = _write_car(calibration, car, drives, parts, where, car_file, out, force)
     configuration = {

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from jaxveh import InputError
+from jaxveh.diagnostics import kit
 
 LOG_HELP = (
     "The log: .csv (.txt, .tsv, .dat), .parquet, .nc, .mf4, .mdf, .mat or .mcap, with a time column and channels (jaxveh schema "
@@ -97,8 +98,9 @@ def span_of(text: str | None, start: float, end: float, option: str = "--calibra
         first = last = float("nan")
     if not colon or not first < last:
         raise InputError(
-            f"{option} {text}: must be START:END in seconds with START before END, such as {start:g}:{(start + end) / 2:g}."
+            f"{option} {text}: must be START:END in seconds with START before END, such as "
+            f"{kit.shown_time(start)}:{kit.shown_time((start + end) / 2)}."
         )
     if first > end or last <= start:
-        raise InputError(f"{option} {text}: lies outside the log, which runs from {start:g} to {end:g} s.")
+        raise InputError(f"{option} {text}: lies outside the log, which runs from {kit.shown_time(start, end)} s.")
     return first, last

@@ -1,6 +1,7 @@
 """Numbers that figures share with the diagnostics that they show, and tools for estimators of real logs."""
 
 from jaxveh.diagnostics.log_delays import a_y_delay
+from jaxveh.diagnostics.log_findings import shown_time
 from jaxveh.diagnostics.observability import UNOBSERVABLE
 from jaxveh.diagnostics.scores import NORMAL_95, NORMAL_HALF
 from jaxveh.diagnostics.sine_with_dwell import DISPLACED_AFTER, DISPLACED_FROM, DISPLACEMENT, YAW_RATE_LIMITS
@@ -18,4 +19,5 @@ __all__ = [
     "UNOBSERVABLE",
     "YAW_RATE_LIMITS",
     "a_y_delay",
+    "shown_time",
 ]

@@ -31,6 +31,12 @@ class LogFinding(NamedTuple):
     values: dict[str, float]
 
 
+def shown_time(seconds: float, end: float | None = None) -> str:
+    """Return a time of a log for a message, to a tenth of a millisecond: also one that counts from 1970. With `end`: from, to."""
+    shown = f"{round(float(seconds), 4):.15g}"
+    return shown if end is None else f"{shown} to {shown_time(end)}"
+
+
 @dataclass(frozen=True)
 class LogView:
     """A recording as NumPy arrays in float64: `time` (T,), `channels` name to (T,), and the `car`, None if unknown."""

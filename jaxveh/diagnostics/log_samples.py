@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import LogFinding, LogView
+from jaxveh.diagnostics.log_findings import LogFinding, LogView, shown_time
 
 HELD = 0.1
 """Share of samples equal to the previous one above which a channel is reported to repeat."""
@@ -85,7 +85,7 @@ def _repeats(name: str, time: np.ndarray, samples: np.ndarray, coarse: float, re
         worst = int(np.argmax(durations))
         message = (
             f"stays constant {int(frozen.sum())} time(s) for more than {FROZEN:g} s, the longest {durations[worst]:.4g} s "
-            f"at {time[starts[worst]]:.6g} s: a dropout that repeats the last value? Set those rows to NaN."
+            f"at {shown_time(time[starts[worst]])} s: a dropout that repeats the last value? Set those rows to NaN."
         )
         values = {"count": float(frozen.sum()), "longest": float(durations[worst]), "time": float(time[starts[worst]])}
         findings.append(LogFinding("warning", name, message, values))
@@ -114,7 +114,7 @@ def _spikes(name: str, time: np.ndarray, samples: np.ndarray) -> list[LogFinding
         return [LogFinding("ok", name, "has no spikes.", {"count": 0.0})]
     worst = int(np.argmax(off))
     message = (
-        f"{int(found.sum())} spike(s), the largest {samples[worst]:.4g} at {time[worst]:.6g} s where its neighbours "
+        f"{int(found.sum())} spike(s), the largest {samples[worst]:.4g} at {shown_time(time[worst])} s where its neighbours "
         f"have {median[worst]:.4g}. Set them to NaN, or use a heavy-tailed noise law."
     )
     values = {"count": float(found.sum()), "time": float(time[worst]), "value": float(samples[worst])}

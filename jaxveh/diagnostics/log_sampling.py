@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import LogFinding, LogView
+from jaxveh.diagnostics.log_findings import LogFinding, LogView, shown_time
 
 GAP = 2.5
 """A step longer than this many usual steps is a gap."""
@@ -33,7 +33,7 @@ def check_sampling(log: LogView) -> list[LogFinding]:
         infinite = int(np.isinf(values).sum())
         if infinite:
             where = float(log.time[np.argmax(np.isinf(values))])
-            message = f"{infinite} infinite sample(s), the first at {where:g} s: replace them by NaN."
+            message = f"{infinite} infinite sample(s), the first at {shown_time(where)} s: replace them by NaN."
             findings.append(LogFinding("error", name, message, {"count": infinite, "time": where}))
         present = np.isfinite(values)
         if not present.any():
@@ -71,7 +71,7 @@ def _raster(label: str, time: np.ndarray, missing: float) -> list[LogFinding]:
         return [regular]
     longest = int(np.argmax(steps))
     message = (
-        f"{int(gaps.sum())} gap(s), the longest {steps[longest]:.4g} s at {time[longest]:.6g} s, together "
+        f"{int(gaps.sum())} gap(s), the longest {steps[longest]:.4g} s at {shown_time(time[longest])} s, together "
         f"{steps[gaps].sum():.4g} s. Filters predict across them; fill inputs with recording.fill."
     )
     if steps[longest] > LONG:

@@ -1,7 +1,8 @@
 """Programs on logs as loggers write them: what was assumed is one line on stderr, and what is missing is told with its remedy."""
 
+import numpy as np
 import pytest
-from programs import columns, error_line, run
+from programs import columns, error_line, run, write_car, write_log
 
 ABOVE = {"nothing": "", "lines above": "Logger 7\nDriver,A. N. Other\n\n", "comments": "# logger 7\n"}
 
@@ -47,3 +48,20 @@ def test_a_unit_that_is_not_sure_is_refused(tmp_path, unit):
     path.write_text(path.read_text(encoding="utf-8").replace("deg/s", unit), encoding="utf-8")
     line = error_line(run("check", path))
     assert f"yaw_rate: unit '{unit}' may be degrees or gradians. Write `deg`" in line
+
+
+@pytest.mark.parametrize("begin", [0.0, 86_000.0, 1_709_287_200.0])
+def test_times_are_shown_so_that_they_can_be_told_apart(tmp_path, begin):
+    table = columns()
+    table["v_x"] = 20.0 + np.sin(table["time"])
+    table["v_x"][100] += 30.0
+    table["time"] = begin + table["time"]
+    path = write_log(tmp_path, table)
+    result = run("check", path)
+    words = " ".join(result.stdout.split())
+    first, last, spike = (f"{one:.12g}" for one in (begin, begin + 1.99, begin + 1.0))
+    assert f"200 rows from {first} to {last} s, every 0.01 s" in words
+    assert f"1 spike(s), the largest 50.84 at {spike} s" in words
+    car = write_car(tmp_path)
+    line = error_line(run("estimate", path, "--vehicle", car, "-o", tmp_path / "o.csv", "--span", "5:6"))
+    assert line.endswith(f"lies outside the log, which runs from {first} to {last} s.")
