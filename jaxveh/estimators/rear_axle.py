@@ -81,7 +81,7 @@ class RearAxle(AbstractAxlePlaces):
       used: the effect of a rolling body is part of `a_y_gain`.
     - `a_y_delay` (s): the delay of a log's accelerometer, and `sensor_delay` (s): the delay of the low-pass of a_x, a_y and
       the yaw rate; they do not affect the states, and are corrected beforehand. `a_y_delay_error` (s): what is left of the
-      delay of a_y against the yaw rate; it is not fitted, only its uncertainty is part of the bands (`rear_axle_prior.UNFITTED`).
+      delay of a_y against the yaw rate; it is not fitted, only its uncertainty is part of the bands (`rear_axle_prior.TIMING`).
     - `drag` (N/(m/s)^2), `front_drive`, `brake_share` (-): longitudinal force `F_x = m a_x + drag v_x^2`, divided by the front
       axle's shares of driving and braking; `ellipse` (-): how much of it counts, `sqrt(1 - (ellipse F_x / (grip load))^2)`.
     - `heading_offset` (rad): the angle of a sideslip reference (an INS) against the car; does not affect the states.
@@ -146,7 +146,7 @@ class RearAxle(AbstractAxlePlaces):
         """v_y of the accelerometer if the rear axle rolls without slip, m/s."""
         return (self.rear_axle_to_cg + self.sensor_x) * (yaw_rate - self.yaw_rate_offset)
 
-    def on_time(self, x: RearAxleState, u) -> Any:
+    def v_y_now(self, x: RearAxleState, u) -> Any:
         """v_y of the accelerometer, m/s. The state is the integral of an a_y that is late by `a_y_delay_error`."""
         late = self.a_y_delay_error * self.specific_force(u.a_y, u.yaw_rate)
         return x.v_y + jnp.where(u.v_x >= rolling_below(self.wheelbase), late, 0.0)
@@ -219,7 +219,7 @@ def observation(system: RearAxle, t, x: RearAxleState, u):
     steady = system.a_y_offset / system.a_y_gain - u.v_x * system.yaw_rate_offset + GRAVITY * system.bank * x.bank
     since = u.a_y_lead / system.a_y_gain - u.turning_lead - u.lag * steady
     return record_type("Measurements", (CHANNEL,))(
-        then + since - system.on_time(x, u) - u.v_x * system.slip_error * x.slip_error
+        then + since - system.v_y_now(x, u) - u.v_x * system.slip_error * x.slip_error
     )
 
 
@@ -237,7 +237,7 @@ def report(system: RearAxle, t, x: RearAxleState, u) -> RearAxleReport:
     del t
     like = jnp.zeros_like(x.v_y)
     yaw_rate = u.yaw_rate - system.yaw_rate_offset
-    v_y = system.on_time(x, u) - system.sensor_x * yaw_rate
+    v_y = system.v_y_now(x, u) - system.sensor_x * yaw_rate
     sideslip = numerics.arctan2(v_y, u.v_x + like)
     front, rear = system.loads(u)
     F_f, F_r = system.shares(u)
