@@ -1,5 +1,7 @@
 """Every tyre's forces at contacts in general position, and at the odd ones, as recorded."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -20,6 +22,15 @@ def file(name):
     return lambda: tyres.from_property_file(shared("tyres") / name)
 
 
+def every_coefficient():
+    """An MF-Tyre none of whose coefficients is zero: files leave many out."""
+    random, tyre = np.random.default_rng(7), tyres.typical_mf_tyre(4000.0)
+    groups = ("longitudinal", "lateral", "aligning", "overturning", "rolling")
+    parts = {name: getattr(tyre, name) for name in groups} | {"turn_slip": tyres.mf_tyre.TurnSlip()}
+    drawn = lambda number: number if number != 0 else jnp.asarray(random.choice([-1, 1]) * random.uniform(0.02, 0.1))
+    return dataclasses.replace(tyre, spins=True, **{name: jax.tree.map(drawn, part) for name, part in parts.items()})
+
+
 def curves(**more):
     """TMeasy by its other curve."""
     tyre = test_every_tyre.tmeasy()
@@ -34,6 +45,7 @@ MORE = {
     "MF-Tyre 6.1": file("mfeval__MagicFormula61_Parameters.tir"),
     "MF-Tyre 5.2": file("chrono__hmmwv__tire__HMMWV_pacejka.tir"),
     "MF-Tyre of a race car": file("tumftm__pa_sim_tireparameters.tir"),
+    "MF-Tyre with every coefficient": every_coefficient,
     "relaxed MF-Tyre": test_every_dynamic_tyre.own_lengths,
 }
 TYRES = (
