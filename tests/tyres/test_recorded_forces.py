@@ -46,6 +46,7 @@ MORE = {
     "MF-Tyre 5.2": file("chrono__hmmwv__tire__HMMWV_pacejka.tir"),
     "MF-Tyre of a race car": file("tumftm__pa_sim_tireparameters.tir"),
     "MF-Tyre with every coefficient": every_coefficient,
+    "generic": lambda: tyres.kit.GENERIC_TYRE.magic_formula(60000.0, 4000.0),
     "relaxed MF-Tyre": test_every_dynamic_tyre.own_lengths,
 }
 TYRES = (

@@ -1,5 +1,6 @@
 """Every vehicle's rates and outputs in general position, and every number of every car that is given by name, as recorded."""
 
+import contextlib
 import dataclasses
 import inspect
 
@@ -98,8 +99,11 @@ def test_numbers_of_cars_given_by_name_are_those_recorded(name):
 
 @pytest.mark.parametrize("name", vehicles.sets.CARS)
 def test_every_named_car_has_the_numbers_recorded(name):
-    """Its own, and those that it has as a simple car, as one that rolls and as the fullest, where they reach."""
+    """Its own, those of its file, and those that it has as a simple car, as one that rolls and as the fullest, where they
+    reach."""
     found = {"own": vehicles.sets.CARS[name]()}
+    with contextlib.suppress(InputError):  # no file can say what it is
+        found["file"] = vehicles.specification_of(found["own"])
     for fidelity in ("single-track", "roll-4dof", list(vehicles.sets.FIDELITIES)[-1]):
         try:
             found[fidelity] = vehicles.named_car(name, fidelity)
