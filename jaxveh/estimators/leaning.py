@@ -71,9 +71,11 @@ class Leaning(AbstractSmoothable):
     ago and does not depend on tyres; `roll_rate`, the rate of roll and bank plus a part of the yaw rate when the car points
     uphill. None of them can distinguish a constant bank from the accelerometer's offset. The two are separated only because
     roads bank to either side about level, while the offset stays. So the standard deviation of the bank falls slowly, and an
-    offset from earlier drives helps (`a_y_offset`). An axle that slides has a slip angle that its force does not give, on ice
-    at any acceleration: the further off it is, the less it counts (`slip_gate`), also where steer and yaw rate do not agree
-    (`steering`, None: not checked), and then the kinematics hold alone. They take a slide that grows slowly for a bank.
+    offset from earlier drives helps (`a_y_offset`). The spreads of bank and offset are wider than those of the drives on which
+    they were chosen: otherwise an offset that is larger than expected is a bank that counts as known. An axle that slides has
+    a slip angle that its force does not give, on ice at any acceleration: the further off it is, the less it counts
+    (`slip_gate`), also where steer and yaw rate do not agree (`steering`, None: not checked), and then the kinematics hold
+    alone. They take a slide that grows slowly for a bank.
 
     **Parameters**: `rear_axle_to_cg` (m); `rear_compliance` (rad/(m/s^2)): the rear axle's slip angle per lateral
     acceleration, `m l_f / (l C_r)`; `roll_gradient` (rad/(m/s^2)), `roll_frequency` (Hz), `roll_damping` (-) of the body over
@@ -92,8 +94,8 @@ class Leaning(AbstractSmoothable):
     roll_gradient: jax.Array = positive("rad/(m/s^2)")
     roll_frequency: jax.Array = positive("Hz", default=1.5)
     roll_damping: jax.Array = positive("-", default=0.3)
-    bank_spread: jax.Array = positive("rad", default=0.025)
-    bank_length: jax.Array = positive("m", default=150.0)
+    bank_spread: jax.Array = positive("rad", default=0.035)
+    bank_length: jax.Array = positive("m", default=200.0)
     bank_edge: jax.Array = positive("m", default=6.0)
     slip_error: jax.Array = positive("rad", default=0.0008)
     slip_error_time: jax.Array = positive("s", default=0.1)
@@ -102,7 +104,7 @@ class Leaning(AbstractSmoothable):
     across: jax.Array = positive("m/s", default=0.06)
     delay: jax.Array = parameter("s", scale=0.1, default=0.14)
     a_y_offset: jax.Array = parameter("m/s^2", scale=0.1, default=0.0)
-    a_y_offset_spread: jax.Array = positive("m/s^2", default=0.06)
+    a_y_offset_spread: jax.Array = positive("m/s^2", default=0.1)
     gyro_offset_spread: jax.Array = positive("rad/s", default=0.12 * DEGREE)
     scale_spread: jax.Array = positive("-", default=0.12)
     steering: SteerAgreement | None = None

@@ -110,9 +110,10 @@ def test_an_axle_that_slides_is_not_a_bank():
     held = np.cumprod(np.abs(found["sideslip"]) < 0.35, axis=2) > 0
     held[:, :, :300] = False
     known = held & said.known.bank.reshape(held.shape)
-    errors = np.sqrt(np.mean(said.mean.bank.reshape(held.shape) ** 2, axis=2, where=known)) / DEGREE
-    assert (errors[:, 0] < 0.7).all() and (errors[:, 1] < 2.0).all(), errors
-    assert (known.sum(axis=2) > 0.5 * held.sum(axis=2)).all()
+    off = lambda rows: np.sqrt(np.mean(said.mean.bank.reshape(held.shape) ** 2, axis=2, where=rows)) / DEGREE
+    assert (off(held)[:, 0] < 0.7).all() and (off(held)[:, 1] < 3.0).all() and (off(known) < 2.0).all()
+    # On dry roads it is mostly known after 12 s; a sliding axle makes it unknown.
+    assert (known[:, 0, 1200:].mean(axis=1) > 0.75).all() and (known[:, 1].sum(axis=1) < 0.5 * held[:, 1].sum(axis=1)).all()
 
 
 def agreements(log, **changes):
