@@ -94,7 +94,7 @@ class Leaning(AbstractSmoothable):
     roll_gradient: jax.Array = positive("rad/(m/s^2)")
     roll_frequency: jax.Array = positive("Hz", default=1.5)
     roll_damping: jax.Array = positive("-", default=0.3)
-    bank_spread: jax.Array = positive("rad", default=0.035)
+    bank_spread: jax.Array = positive("rad", default=0.03)
     bank_length: jax.Array = positive("m", default=200.0)
     bank_edge: jax.Array = positive("m", default=6.0)
     slip_error: jax.Array = positive("rad", default=0.0008)
@@ -104,7 +104,7 @@ class Leaning(AbstractSmoothable):
     across: jax.Array = positive("m/s", default=0.06)
     delay: jax.Array = parameter("s", scale=0.1, default=0.14)
     a_y_offset: jax.Array = parameter("m/s^2", scale=0.1, default=0.0)
-    a_y_offset_spread: jax.Array = positive("m/s^2", default=0.1)
+    a_y_offset_spread: jax.Array = positive("m/s^2", default=0.09)
     gyro_offset_spread: jax.Array = positive("rad/s", default=0.12 * DEGREE)
     scale_spread: jax.Array = positive("-", default=0.12)
     steering: SteerAgreement | None = None
