@@ -57,7 +57,7 @@ def chosen_parameters(model: Any):
     return (*axle, *body, *sensors, *levels)
 
 
-def unfitted(system: RearAxle) -> dict[str, float]:
+def unfitted_spreads(system: RearAxle) -> dict[str, float]:
     """Standard deviations of parameters that a log does not tell and a calibration does not fit, by name, in their units."""
     return {"a_y_delay_error": TIMING * float(system.wheelbase / USUAL_WHEELBASE) ** 0.5}
 

@@ -30,7 +30,7 @@ from jaxveh.estimators.method import AbstractMethod, Answers, LiveMethod, method
 from jaxveh.estimators.parameter_bands import Members, estimate_with_members, members_of_fit, members_of_prior
 from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
-from jaxveh.estimators.rear_axle_prior import SPREADS, car_of, chosen_parameters, unfitted
+from jaxveh.estimators.rear_axle_prior import SPREADS, car_of, chosen_parameters, unfitted_spreads
 from jaxveh.estimators.sideslip_methods import METHODS
 from jaxveh.estimators.sideslip_score import (
     at_centre,
@@ -320,10 +320,10 @@ def _check_alone(filter: AbstractFilter | None, key: Any) -> None:
 def _members(source: Calibration | StateSpace | CarSpecification | RearAxle, model: StateSpace) -> Members | None:
     """Models that represent the uncertainty of the parameters; None where the parameters count as known."""
     if isinstance(source, Calibration):
-        return members_of_fit(source.fit, unfitted(model.system))
+        return members_of_fit(source.fit, unfitted_spreads(model.system))
     if isinstance(source, StateSpace):
         return None
-    return members_of_prior(model, chosen_parameters, SPREADS, unfitted(model.system))
+    return members_of_prior(model, chosen_parameters, SPREADS, unfitted_spreads(model.system))
 
 
 @overload

@@ -113,7 +113,9 @@ def test_an_axle_that_slides_is_not_a_bank():
     off = lambda rows: np.sqrt(np.mean(said.mean.bank.reshape(held.shape) ** 2, axis=2, where=rows)) / DEGREE
     assert (off(held)[:, 0] < 0.7).all() and (off(held)[:, 1] < 3.0).all() and (off(known) < 2.0).all()
     # On dry roads it is mostly known after 12 s; a sliding axle makes it unknown.
-    assert (known[:, 0, 1200:].mean(axis=1) > 0.75).all() and (known[:, 1].sum(axis=1) < 0.5 * held[:, 1].sum(axis=1)).all()
+    assert (known[:, 0, 1200:].mean(axis=1) > 0.75).all() and (
+        known[:, 1].sum(axis=1) < 0.5 * held[:, 1].sum(axis=1)
+    ).all()
 
 
 def agreements(log, **changes):

@@ -349,7 +349,7 @@ def test_an_a_y_that_is_a_little_late_is_in_the_bands():
     assert lacks > 0.5 * delay * np.std(np.asarray(recording["a_y"])) and left < 0.3 * lacks
     usual = eqx.tree_at(lambda model: model.system.rear_axle_to_cg, model, 2.6 - CAR.front_axle_to_cg)
     for size, one in ((CAR.wheelbase / 2.6, model), (1.0, usual)):
-        spreads = estimators.sideslip.unfitted(one.system)
+        spreads = estimators.sideslip.unfitted_spreads(one.system)
         members = parameter_bands.members_of_prior(one, lambda model: model.system.grip, {"grip": 1e-6}, spreads)
         spread = members.models.system.a_y_delay_error
         np.testing.assert_allclose([spread.mean(), spread.std()], [0.0, delay * size**0.5], atol=1e-12)
@@ -393,7 +393,7 @@ def test_bands_of_a_car_at_its_word_are_as_wide_as_its_file_is_worth(monkeypatch
     """Where only the stiffness is not known, they are those of the stiffest and the softest car that the file may mean."""
     recording = log(1500).without("v_y")
     monkeypatch.setattr(estimators.sideslip, "SPREADS", dict.fromkeys(estimators.sideslip.SPREADS, 1e-4))
-    monkeypatch.setattr(estimators.sideslip, "unfitted", lambda system: {})
+    monkeypatch.setattr(estimators.sideslip, "unfitted_spreads", lambda system: {})
     sure = estimators.sideslip.estimate(estimators.sideslip.model(CAR), recording)
     known = estimators.sideslip.estimate(CAR, recording)
     np.testing.assert_allclose(known.std.sideslip, sure.std.sideslip, rtol=1e-2)

@@ -8,7 +8,7 @@ from jaxveh.estimators.live import Live, live_init, live_step
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.parameter_bands import members_of_prior
 from jaxveh.estimators.rear_axle import rear_axle_model
-from jaxveh.estimators.rear_axle_prior import SPREADS, car_of, chosen_parameters, unfitted
+from jaxveh.estimators.rear_axle_prior import SPREADS, car_of, chosen_parameters, unfitted_spreads
 from jaxveh.estimators.sideslip_methods.common import A_Y, YAW_RATE, Guarded, guard
 from jaxveh.filters import Extended
 from jaxveh.io import CarSpecification
@@ -44,5 +44,5 @@ def rear_axle(car: CarSpecification) -> Guarded:
     system = car_of(car)
     model = rear_axle_model(system)
     cleaning = RearAxleCleaning(car.wheelbase)
-    members = members_of_prior(model, chosen_parameters, SPREADS, unfitted(system))
+    members = members_of_prior(model, chosen_parameters, SPREADS, unfitted_spreads(system))
     return guard(car, AsLive(Live(Extended(), model, cleaning, None, members)), (YAW_RATE, A_Y))
