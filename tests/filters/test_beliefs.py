@@ -9,6 +9,7 @@ from test_every_filter import FILTERS, batch
 
 from jaxveh.filters.delayed import _first
 from jaxveh.filters.particle import without
+from jaxveh.observers.base import PointBelief
 from jaxveh.statespace import AbstractBelief
 
 BELIEFS = {
@@ -18,7 +19,10 @@ BELIEFS = {
 }  # fmt: skip
 """A filter of every kind of belief."""
 
-NO_COVARIANCE = {"LaggedBelief": "a fixed-lag smoother's is asked of the filter inside"}
+NO_COVARIANCE = {
+    "LaggedBelief": "a fixed-lag smoother's is asked of the filter inside",
+    PointBelief.__name__: "a number of an observer: it has no spread",
+}
 
 
 def kinds(base):
@@ -52,7 +56,7 @@ def test_standard_deviations_are_those_of_the_covariance_and_draws_have_the_mean
     [([0, 3, 5], [1, 1, 1], 3), ([4, 0, 5], [0, 1, 1], 5), ([0, 0], [1, 1], 0), ([2], [0], 0)],
 )
 def test_the_first_failure_of_rows_filtered_anew_is_told(codes, real, first):
-    assert int(_first(jnp.asarray(codes), jnp.asarray(real, bool))) == first
+    assert int(_first(jnp.asarray(codes, jnp.int32), jnp.asarray(real, bool))) == first
 
 
 def test_a_lost_particle_has_no_weight():
