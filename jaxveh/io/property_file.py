@@ -14,25 +14,17 @@ from jaxveh.io.files import check_readable, replacing_file
 
 PROPERTY_UNITS = {
     "LENGTH": {
-        **{"meter": 1.0, "metre": 1.0, "m": 1.0, "mm": 1e-3, "millimeter": 1e-3, "millimetre": 1e-3, "cm": 1e-2},
-        **{
-            "centimeter": 1e-2,
-            "centimetre": 1e-2,
-            "km": 1e3,
-            "kilometer": 1e3,
-            "inch": 0.0254,
-            "inches": 0.0254,
-            "foot": 0.3048,
-        },
+        "meter": 1.0, "metre": 1.0, "m": 1.0, "mm": 1e-3, "millimeter": 1e-3, "millimetre": 1e-3, "cm": 1e-2, "centimeter": 1e-2,
+        "centimetre": 1e-2, "km": 1e3, "kilometer": 1e3, "inch": 0.0254, "inches": 0.0254, "foot": 0.3048,
     },
     "FORCE": {
-        **{"newton": 1.0, "n": 1.0, "kn": 1e3, "kilonewton": 1e3, "knewton": 1e3, "dekanewton": 10.0},
-        **{"pound_force": 4.4482216152605, "kilogram_force": 9.80665, "kg_force": 9.80665},
+        "newton": 1.0, "n": 1.0, "kn": 1e3, "kilonewton": 1e3, "knewton": 1e3, "dekanewton": 10.0,
+        "pound_force": 4.4482216152605, "kilogram_force": 9.80665, "kg_force": 9.80665,
     },
     "ANGLE": {"radian": 1.0, "radians": 1.0, "rad": 1.0},
     "MASS": {"kg": 1.0, "kilogram": 1.0, "gram": 1e-3, "tonne": 1e3, "pound_mass": 0.45359237},
     "TIME": {"second": 1.0, "sec": 1.0, "s": 1.0, "millisecond": 1e-3, "minute": 60.0, "hour": 3600.0},
-}
+}  # fmt: skip
 """The allowed units of a [UNITS] section, and their size in SI; words also in the plural, with an `s`."""
 
 _SECTION = re.compile(r"^\s*\[(?P<name>[^\]]+)\]\s*$")

@@ -33,7 +33,7 @@ _SPELLINGS = {spelling: unit for unit, spellings in _IN_ANY_CASE.items() for spe
 _PREFIXED = {
     "meter": ("kilo", "deci", "centi", "milli", "micro"), "second": ("milli", "micro", "nano"), "gram": ("kilo", "milli"),
     "newton": ("kilo", "mega", "deca"), "pascal": ("hecto", "kilo", "mega"), "bar": ("milli",), "joule": ("kilo",),
-    "radian": ("milli", "micro"), "standard_gravity": ("milli",), "hertz": ("kilo", "mega"),
+    "radian": ("milli", "micro"), "degree": ("milli",), "standard_gravity": ("milli",), "hertz": ("kilo", "mega"),
 }  # fmt: skip
 """The prefixes with which a unit is in use. pint puts any prefix in front of any unit: `Grad` would be a gigaradian."""
 

@@ -185,7 +185,7 @@ def test_spellings_of_loggers(unit, target):
 
 IN_USE = """
     km/h kph m/s cm/s mm/s km/s um/s dm/s kmph mm/h cm/h um/h dm/h km/min cm/min mm/min um/min dm/min
-    rad mrad urad rad/s mrad/s urad/s kPa hPa MPa Pa mbar bar N kN MN daN
+    rad mrad urad mdeg mdegree rad/s mrad/s urad/s mdeg/s kPa hPa MPa Pa mbar bar N kN MN daN
 """
 """What a prefix (or none) before one of the units of the next test may give."""
 

@@ -48,11 +48,11 @@ class SlipAware(AbstractMethod):
         slip    = exp(softness) F / (K F_z) - f_r / K,      F from the torques if the log has them, else from `force`
 
     `gain` models that an accelerometer on the body pitches with it: g times the file's `pitch_gradient`, or that of usual cars.
-    A wheel with more load rolls with a smaller radius: `sink = sinking (F_z / F_z at rest - 1)`. It is a state, because tyres
-    differ: 0.017 for a belt whose radius decreases by a third of the tyre's compression, 0.003 to 0.005 for a radial tyre by
-    Pacejka's curve of the effective rolling radius. With a wrong number, wheels that differ in a turn would be taken for the slip
-    of a larger force, and the accelerometer for one with an offset. Lateral velocities are those of a steady turn with the file's
-    cornering stiffnesses.
+    A wheel with more load rolls with a smaller radius: `sink = sinking (F_z / F_z at rest - 1)`. It is a state, whose prior has
+    the mean `sinking` (-), because tyres differ: 0.017 for a belt whose radius decreases by a third of the tyre's compression,
+    0.003 to 0.005 for a radial tyre by Pacejka's curve of the effective rolling radius. With a wrong number, wheels that differ
+    in a turn would be taken for the slip of a larger force, and the accelerometer for one with an offset. Lateral velocities
+    are those of a steady turn with the file's cornering stiffnesses.
 
     **Trust**: a wheel is weighted by `(gate / |e|)^8` where its normalised innovation e is beyond `gate`, and likewise where its
     acceleration differs from the car's by more than `rate_gate` (m/s^2; four times that without an accelerometer). Trust is lost
@@ -179,17 +179,8 @@ class SlipAware(AbstractMethod):
         slope_walk = jnp.where(felt, s.slope_walk, 0.0)
         # The walk of each wheel's own radius is added below.
         walks = [
-            wander,
-            s.force_walk,
-            slope_walk,
-            s.offset_walk,
-            none,
-            0.5 * s.radius_walk,
-            *[none] * 4,
-            soft,
-            soft,
-            none,
-        ]
+            wander, s.force_walk, slope_walk, s.offset_walk, none, 0.5 * s.radius_walk, *[none] * 4, soft, soft, none,
+        ]  # fmt: skip
         noise = jnp.diag(jnp.square(jnp.stack(walks))) + own_radii(s.radius_walk)
         return predict(memory.belief, move, step * noise)
 

@@ -75,10 +75,10 @@ class SpeedState(NamedTuple):
 class Spreads(eqx.Module):
     """Standard deviations of the prior, of the random walks, and of the measurements.
 
-    `slope_walk` and the other walks are per root second. The slope decays to zero with `slope_time` (s), a softness to the file's
-    with `softness_time` (s), with a random walk that keeps its standard deviation. `radius` (-) is that of each wheel's own
-    radius error; the common one has half of it. `wheel` (m/s) is the quantisation of the sensor's teeth, `wheel_share` (-) is
-    proportional to the speed.
+    `slope_walk` and the other walks are per root second. The slope decays to zero with `slope_time` (s), a softness to the
+    file's with `softness_time` (s), with a random walk that keeps its standard deviation. `radius` (-) is that of each wheel's
+    own radius error; the common one has half of it; `sinking` (-) that of the state of this name. `wheel` (m/s) is the
+    quantisation of the sensor's teeth, `wheel_share` (-) is proportional to the speed.
 
     The following errors are correlated in time, so that `repeats` (-) samples count as one: `slip_share` (-), a share of the
     expected slip; `peak_slip` (-), unknown slip at a force equal to the load, which falls with the fourth power of the force;
