@@ -9,7 +9,8 @@ A quantity is a module of `jaxveh.estimators`. It has, in addition to what its c
 - `METHODS`: `MethodOfCar` by name. `RECOMMENDED`: the name of the recommended one.
 - `do_nothing(car, recording)`: the answer without any method, (T,) by the names of `SHOWN`.
 - `estimate(source, recording, *, method=...)` and `live(source, *, method=...)`; `source` is a car's file, or a method with
-  numbers of one's own. If one of its methods is an `AbstractSmoothable`, `estimate` has `smoothed=False`, too.
+  numbers of one's own. If one of its methods is an `AbstractSmoothable`, `estimate` has `smoothed=False`, too. They are made by
+  `quantity.estimate_of` or `smoothable_estimate_of`, and `live_of`.
 """
 
 from __future__ import annotations

@@ -305,18 +305,28 @@ def has_example(entry: Entry, uses: dict[str, list[tuple[str, str]]]) -> bool:
 
 
 def _heading(entry: Entry) -> str:
-    """Name and text: by mkdocstrings for names of this package; the value and its text; a note for names of other libraries."""
+    """Name and text: by mkdocstrings for names that this package defines, here for functions made by others; the value and its
+    text; a note for names of other libraries."""
     anchor = f"## {entry.name} {{ #{entry.path} }}"
     if not callable(entry.value):
         return f"{anchor}\n\n{_shown_value(entry.value)}\n\n{text_of_value(entry)}"
     if not (entry.value.__module__ or "").startswith("jaxveh"):
         return f"{anchor}\n\n`{entry.value.__module__}.{entry.name}`, as it is."
+    if _is_made_by_function(entry.value):
+        # mkdocstrings reads the source, where it has neither a signature nor a text.
+        return f"{anchor}\n\n```python\n{signature_of(entry)}\n```\n\n{inspect.getdoc(entry.value)}"
     home = f"{entry.value.__module__}.{entry.name}"
     if not entry.value.__module__.endswith(f".{entry.name}") or entry.module == entry.value.__module__:
         return f"::: {entry.path}"
     # By the path in the room, mkdocstrings would find the module of the same name.
     options = f'    options:\n      heading: "{entry.path}"\n      toc_label: "{entry.name}"'
     return f'<a id="{entry.path}"></a>\n\n::: {home}\n{options}'
+
+
+def _is_made_by_function(value: Any) -> bool:
+    """Whether a function is made by another one, and not as the wrapper of a definition."""
+    code = getattr(value, "__code__", None)
+    return code is not None and "<locals>" in code.co_qualname and not hasattr(value, "__wrapped__")
 
 
 def _shown_value(value: Any) -> str:

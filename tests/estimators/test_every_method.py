@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+import pickle
 from types import ModuleType
 
 import equinox as eqx
@@ -54,6 +55,16 @@ def stacked(logs, needs, dtype=float):
     """Time (T,) and the channels' values, (L, T) each."""
     time = jnp.asarray(next(iter(logs.values())).time, dtype)
     return time, {n.channel: jnp.stack([jnp.asarray(log[n.channel], dtype) for log in logs.values()]) for n in needs}
+
+
+@every_quantity
+def test_the_functions_of_a_quantity_say_in_which_units_and_are_found_by_a_pickle(quantity):
+    module = QUANTITIES[quantity]
+    for function in (module.estimate, module.live):
+        assert pickle.loads(pickle.dumps(function)) is function
+        # The sideslip's, whose calibration is another estimator, have texts of their own.
+        said = (f"`{field}` ({unit})" in function.__doc__ for field, unit in module.SHOWN.items())
+        assert quantity == "sideslip" or all(said)
 
 
 @every_quantity

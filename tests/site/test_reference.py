@@ -61,6 +61,13 @@ def test_a_signature_and_its_arguments():
     assert words["steering"] != words["wheel_radius"]
 
 
+def test_a_function_that_is_made_by_another_has_its_signature_and_its_text(tmp_path):
+    reference.write_reference(tmp_path, tmp_path, {})
+    page = (tmp_path / reference.page_of("jaxveh.estimators.navigation")).read_text()
+    assert "estimators.navigation.estimate(source, recording, method='rear_axle')" in page
+    assert "`sideslip` (rad) along a log." in page and "::: jaxveh.estimators.navigation.estimate" not in page
+
+
 def test_an_example_is_the_shortest_statement_that_uses_a_name():
     pages = {
         "a.md": "```python\nx = filters.run(filters.Kalman(), model, drive)\nfilters.run\n```\n",

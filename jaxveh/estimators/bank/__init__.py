@@ -7,16 +7,14 @@ degrees.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.bank.observers import disturbance_observer, unknown_input_observer
 from jaxveh.estimators.bank.tseng import tseng_of
-from jaxveh.estimators.following import follow
 from jaxveh.estimators.leaning import leaning_filter
-from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
+from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.quantity import live_of, smoothable_estimate_of
 from jaxveh.io import CarSpecification
 
 NAME = "bank"
@@ -55,12 +53,5 @@ def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndar
     return dict.fromkeys(SHOWN, np.zeros(len(recording)))
 
 
-def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED, smoothed: bool = False) -> Answers:
-    """Bank (rad) along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. `smoothed`: each
-    row is estimated from all rows. **Raises** as `follow`."""
-    return follow(NAME, method_of(NAME, METHODS, source, method), recording, smoothed=smoothed)
-
-
-def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same, one row at a time."""
-    return LiveMethod(method_of(NAME, METHODS, source, method))
+estimate = smoothable_estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
+live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)

@@ -7,15 +7,12 @@ force over the load. **It is not observable while the tyres work in their linear
 
 from __future__ import annotations
 
-from typing import Any
-
 import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.body_motion import number_of
-from jaxveh.estimators.following import follow
 from jaxveh.estimators.friction.along import AlongEvidence, WheelForces
 from jaxveh.estimators.friction.augmented import augmented_filter
 from jaxveh.estimators.friction.axles import AligningTorque, Axles, HybridObserver, LateralCurve
@@ -26,7 +23,8 @@ from jaxveh.estimators.friction.scalar import Follower
 from jaxveh.estimators.friction.slipping_wheels import SidesApart, WheelObserver
 from jaxveh.estimators.friction.stiffness_doubt import with_doubt
 from jaxveh.estimators.friction.wheels import Reconstruction, SlipSlope, WheelSlips
-from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
+from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.quantity import estimate_of, live_of
 from jaxveh.io import CarSpecification
 from jaxveh.tyres import LuGre
 
@@ -146,11 +144,5 @@ def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndar
     return {"friction": np.ones(len(recording))}
 
 
-def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
-    """Friction along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. **Raises** as `follow`."""
-    return follow(NAME, method_of(NAME, METHODS, source, method), recording)
-
-
-def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same, one row at a time."""
-    return LiveMethod(method_of(NAME, METHODS, source, method))
+estimate = estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
+live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)

@@ -7,15 +7,13 @@ in a file (`write_learned`, `read_learned`), from which the next drive starts (`
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.following import follow
 from jaxveh.estimators.geometry.learned import Learned, numbers_learned, read_learned, start_from, write_learned
 from jaxveh.estimators.geometry.learner import UNITS, learner_of
-from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
+from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.quantity import estimate_of, live_of
 from jaxveh.io import CarSpecification
 
 NAME = "geometry"
@@ -40,15 +38,8 @@ def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndar
     return {name: np.full(len(recording), np.nan if value is None else value) for name, value in told.items()}
 
 
-def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
-    """The slow parameters along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. **Raises** as
-    `follow`."""
-    return follow(NAME, method_of(NAME, METHODS, source, method), recording)
-
-
-def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same, one row at a time."""
-    return LiveMethod(method_of(NAME, METHODS, source, method))
+estimate = estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
+live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)
 
 
 __all__ = [

@@ -1,18 +1,19 @@
-"""Satellite navigation with an inertial unit and a camera: sections 1.3.2 and 1.3.3 of the review (Chen, Gao, Xu 2013)."""
+"""Satellite navigation with an inertial unit and a camera: sections 1.3.2 and 1.3.3 of the review (Chen, Gao, Xu 2013).
+
+The answers have velocity, yaw and sideslip, and those of the filters roll, slopes and biases, too.
+"""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.following import follow
-from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
+from jaxveh.estimators.method import MethodOfCar
 from jaxveh.estimators.navigation.method import Navigation, navigation_model
 from jaxveh.estimators.navigation.multi_rate import multi_rate_of
 from jaxveh.estimators.navigation.of_car import navigation, navigation_of
 from jaxveh.estimators.navigation.system import Navigator, Parts
+from jaxveh.estimators.quantity import estimate_of, live_of
 from jaxveh.io import CarSpecification
 
 NAME = "navigation"
@@ -86,12 +87,5 @@ def _held(recording: Recording, name: str) -> np.ndarray:
     return held
 
 
-def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
-    """Velocity, yaw and sideslip along a log, with roll, slopes and biases. `source`: a car's file, or a method; `method`: a name
-    of `METHODS`. **Raises** as `follow`."""
-    return follow(NAME, method_of(NAME, METHODS, source, method), recording)
-
-
-def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same, one row at a time."""
-    return LiveMethod(method_of(NAME, METHODS, source, method))
+estimate = estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
+live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)

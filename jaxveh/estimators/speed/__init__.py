@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.following import follow
-from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
+from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.quantity import estimate_of, live_of
 from jaxveh.estimators.speed.abs_peaks import AdaptiveNonlinear
 from jaxveh.estimators.speed.accelerometer import AccelerometerIntegral
 from jaxveh.estimators.speed.car_numbers import FORCE_KEYS, keys_of, speed_car
@@ -101,11 +99,5 @@ def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndar
     return {"v_x": mean[last]}
 
 
-def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
-    """Speed along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. **Raises** as `follow`."""
-    return follow(NAME, method_of(NAME, METHODS, source, method), recording)
-
-
-def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same, one row at a time."""
-    return LiveMethod(method_of(NAME, METHODS, source, method))
+estimate = estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
+live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)

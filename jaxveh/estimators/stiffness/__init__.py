@@ -6,13 +6,11 @@ camber thrust, compliance, roll steer. The methods start from the values of the 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.following import follow
-from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
+from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.quantity import live_of, smoothable_estimate_of
 from jaxveh.estimators.stiffness.least_squares import AxleForces, Derivatives
 from jaxveh.estimators.stiffness.single_track import Followed, linear_car
 from jaxveh.estimators.stiffness.walking import WalkingStiffness
@@ -50,12 +48,5 @@ def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndar
     return {name: np.full(len(recording), getattr(car, name)) for name in SHOWN}
 
 
-def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED, smoothed: bool = False) -> Answers:
-    """Stiffnesses along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. `smoothed`: each
-    row is estimated from all rows. **Raises** as `follow`."""
-    return follow(NAME, method_of(NAME, METHODS, source, method), recording, smoothed=smoothed)
-
-
-def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same, one row at a time."""
-    return LiveMethod(method_of(NAME, METHODS, source, method))
+estimate = smoothable_estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
+live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)
