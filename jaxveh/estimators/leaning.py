@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.names import record_type
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_from_zero, number_of, numbers_in
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
@@ -108,9 +108,6 @@ class Leaning(AbstractSmoothable):
     gyro_offset_spread: jax.Array = positive("rad/s", default=0.12 * DEGREE)
     scale_spread: jax.Array = positive("-", default=0.12)
     steering: SteerAgreement | None = None
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @property
     def needs(self):

@@ -13,6 +13,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
+from jaxveh._core.parameter import check_parameters
 from jaxveh._core.recording import Recording, time_for
 from jaxveh.estimators.parameter_bands import Members
 from jaxveh.numerics import apart
@@ -23,8 +24,11 @@ class AbstractCleaning(eqx.Module):
     """Prepares the rows of a log for a filter, row by row, looking back only.
 
     A row is a time (s) and a mapping of `channels` to scalars, NaN where missing. The methods return the memory for the next
-    row, and the channels for the filter.
+    row, and the channels for the filter. Declared parameters are checked as those of a method are.
     """
+
+    def __check_init__(self):
+        check_parameters(self)
 
     @property
     @abc.abstractmethod

@@ -27,6 +27,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.estimated import Estimated
 from jaxveh._core.names import record
+from jaxveh._core.parameter import check_parameters
 from jaxveh._core.result import Result, code
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning, AsItIs, row_of
@@ -50,8 +51,13 @@ class Answer(NamedTuple):
 class AbstractMethod(eqx.Module):
     """A method. A row is a time (s) and a mapping of the channels of `needs` to scalars, NaN where not measured.
 
-    Numbers that may be fitted are array leaves. Everything is a pure function of scalars: a batch is `jax.vmap`.
+    Numbers that may be fitted are array leaves; those that a class declares as parameters are checked when it is made.
+    Everything is a pure function of scalars: a batch is `jax.vmap`. **Raises** `InputError` for a parameter that is not finite,
+    or not positive where it must be.
     """
+
+    def __check_init__(self):
+        check_parameters(self)
 
     @property
     @abc.abstractmethod

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.names import record_type
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators import mass_and_grade
 from jaxveh.estimators.body_motion import (
     SILENCE,
@@ -122,9 +122,6 @@ class Pulling(AbstractSmoothable):
     slip_spread: jax.Array = positive("1/(m/s^2)", default=0.003)
     brake_doubt: jax.Array = positive("-", default=0.1)
     sliding: Sliding = eqx.field(default_factory=Sliding)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @property
     def needs(self):

@@ -7,6 +7,7 @@ from typing import Any
 import equinox as eqx
 import jax
 
+from jaxveh._core.parameter import check_parameters
 from jaxveh.estimators.contract import Need
 
 LATERAL = (Need("v_x", "m/s"), Need("steer", "rad"), Need("yaw_rate", "rad/s"), Need("a_y", "m/s^2"))
@@ -24,6 +25,9 @@ class AbstractAxlePlaces(eqx.Module):
 
     front_axle_to_cg: eqx.AbstractVar[jax.Array]
     rear_axle_to_cg: eqx.AbstractVar[jax.Array]
+
+    def __check_init__(self):
+        check_parameters(self)
 
     @property
     def wheelbase(self) -> Any:

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import InputError, manoeuvres, roads, statespace, tyres
+from jaxveh import InputError, estimators, manoeuvres, roads, statespace, tyres
 from jaxveh._core import errors
 from jaxveh.kit import positive
 
@@ -17,7 +17,7 @@ from jaxveh.kit import positive
 UNCHECKED = {"AbstractManoeuvre"}
 BASES = {
     name: getattr(room, name)
-    for room in (manoeuvres, roads, tyres)
+    for room in (estimators, estimators.kit, manoeuvres, roads, tyres)
     for name in room.__all__
     if name.startswith("Abstract") and name not in UNCHECKED
 }

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.names import record_type
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import SILENCE, away_from_zero, hold, number_of
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.leaning import Leaning, leaning_filter
@@ -100,9 +100,6 @@ class Learner(AbstractMethod):
     play: jax.Array = positive("rad", default=5e-4)
     late: jax.Array = positive("s", default=0.025)
     time: jax.Array = positive("s", default=0.15)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @property
     def needs(self):

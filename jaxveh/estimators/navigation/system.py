@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.names import record_type
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.navigation.window import rotate
 from jaxveh.estimators.two_axles import AbstractAxlePlaces
 from jaxveh.vehicles import GRAVITY
@@ -98,9 +98,6 @@ class Navigator(AbstractAxlePlaces):
     bend_time: jax.Array = positive("s", default=3.0)
     camera_x: jax.Array = parameter("m", default=0.0)
     parts: Parts = eqx.field(static=True, default=PLAIN)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @property
     def lags(self) -> dict[str, Any]:

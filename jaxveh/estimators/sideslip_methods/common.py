@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractMethod, Answer, answer
@@ -89,9 +89,6 @@ class Guarded(AbstractMethod):
     holds: tuple[str, ...] = eqx.field(static=True, default=())
     anew: bool = eqx.field(static=True, default=False)
     claims: bool = eqx.field(static=True, default=True)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @property
     def needs(self):

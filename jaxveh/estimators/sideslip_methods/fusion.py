@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import filters
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.estimators.memberships import large
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.sideslip_methods.common import (
@@ -58,9 +58,6 @@ class AbstractFusion(AbstractMethod):
     """A dynamic method `inner`, and the integral of `a_y - v_x r`."""
 
     inner: AbstractMethod
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @abc.abstractmethod
     def fuse(self, memory: FusionMemory, dt: Any, rate: Any, model: Any, values: dict[str, Any]) -> tuple[Any, Any]:

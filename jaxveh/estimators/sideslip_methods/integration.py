@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.sideslip_methods.common import (
     A_Y,
@@ -63,9 +63,6 @@ class AbstractIntegration(AbstractMethod):
     rear_axle_to_cg: jax.Array = positive("m")
     slowest: jax.Array = positive("m/s")
     drift: jax.Array = parameter("m/s^2", scale=0.1, default=OFFSET)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @abc.abstractmethod
     def roll_of(self, memory: Integral | None, t: Any, values: dict[str, Any]) -> tuple[Any, Any, Any]:

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.sideslip_methods.common import (
     A_Y,
@@ -68,9 +68,6 @@ class SideslipNetwork(AbstractMethod):
     rear_compliance: jax.Array = positive("rad/(m/s^2)")
     slowest: jax.Array = positive("m/s", default=3.0)
     steer_offset: jax.Array = parameter("rad", scale=0.02, default=0.0)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @property
     def needs(self):

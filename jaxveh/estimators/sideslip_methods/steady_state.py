@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.sideslip_methods.common import A_Y, STEER, V_X, YAW_RATE, Guarded, guard, sideslip_answer
 from jaxveh.estimators.two_axles import AbstractAxlePlaces
@@ -30,9 +30,6 @@ class AbstractSteadyState(AbstractAxlePlaces, AbstractMethod):
     rear_axle_to_cg: jax.Array = positive("m")
     front_stiffness: jax.Array = positive("N/rad")
     rear_stiffness: jax.Array = positive("N/rad")
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def first(self, t, values):
         return self.next((), t, values)

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.sideslip_methods.common import (
@@ -49,9 +49,6 @@ class SteeringTorque(AbstractMethod):
     trail: jax.Array = positive("m", default=TRAIL)
     assist: jax.Array = parameter("-", scale=1.0, default=0.0)
     steer_offset: jax.Array = parameter("rad", scale=0.02, default=0.0)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @property
     def needs(self):

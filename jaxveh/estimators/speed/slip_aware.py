@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import steer_heard
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.sequential import (
@@ -89,9 +89,6 @@ class SlipAware(AbstractMethod):
     smoothing: jax.Array = positive("s", default=0.06)
     known_share: jax.Array = positive("-", default=0.02)
     known_speed: jax.Array = positive("m/s", default=0.15)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @property
     def needs(self):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.numerics import smooth_step
@@ -108,9 +108,6 @@ class AbstractWheelMethod(AbstractMethod):
     smoothing: jax.Array = positive("s", default=0.1)
     agreement: jax.Array = positive("-", default=0.02)
     agreement_speed: jax.Array = positive("m/s", default=0.1)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @property
     def needs(self):
