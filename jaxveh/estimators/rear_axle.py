@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.bijectors import Interval
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.two_axles import AbstractAxlePlaces
+from jaxveh.estimators.two_axles import AbstractTwoAxles
 from jaxveh.statespace import Continuous, Gaussian, Prior, StateDependent, StateSpace
 from jaxveh.vehicles import GRAVITY
 
@@ -70,7 +70,7 @@ class RearAxleReport(NamedTuple):
     reference_sideslip: Any
 
 
-class RearAxle(AbstractAxlePlaces):
+class RearAxle(AbstractTwoAxles):
     """A car reduced to the rear axle, for estimating sideslip; it needs neither steer nor any front axle parameter.
 
     - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m).
@@ -92,10 +92,7 @@ class RearAxle(AbstractAxlePlaces):
     Inputs: see `INPUTS`. Axes of ISO 8855; a positive slip angle gives a positive lateral force.
     """
 
-    mass: jax.Array = positive("kg")
     yaw_inertia: jax.Array = positive("kg m^2")
-    front_axle_to_cg: jax.Array = positive("m")
-    rear_axle_to_cg: jax.Array = positive("m")
     cg_height: jax.Array = positive("m")
     stiffness: jax.Array = positive("1/rad")
     grip: jax.Array = positive("-", default=1.0)

@@ -1,14 +1,16 @@
 """What estimators share that know a car by its two axles."""
 
-# No postponed annotations here: equinox does not see an AbstractVar in a string.
+from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import equinox as eqx
 import jax
 
-from jaxveh._core.parameter import check_parameters
+from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.estimators.contract import Need
+from jaxveh.io import CarSpecification
 
 LATERAL = (Need("v_x", "m/s"), Need("steer", "rad"), Need("yaw_rate", "rad/s"), Need("a_y", "m/s^2"))
 """Speed, steer at the road wheels, yaw rate and lateral acceleration."""
@@ -20,11 +22,12 @@ LONGEST = 0.3
 """s: a value that is older than this is no longer known."""
 
 
-class AbstractAxlePlaces(eqx.Module):
-    """A car whose axles are `front_axle_to_cg` and `rear_axle_to_cg` (m) away from the centre of gravity."""
+class AbstractTwoAxles(eqx.Module):
+    """A car of `mass` (kg), whose axles are `front_axle_to_cg` and `rear_axle_to_cg` (m) away from the centre of gravity."""
 
-    front_axle_to_cg: eqx.AbstractVar[jax.Array]
-    rear_axle_to_cg: eqx.AbstractVar[jax.Array]
+    mass: jax.Array = positive("kg")
+    front_axle_to_cg: jax.Array = positive("m")
+    rear_axle_to_cg: jax.Array = positive("m")
 
     def __check_init__(self):
         check_parameters(self)
@@ -35,11 +38,22 @@ class AbstractAxlePlaces(eqx.Module):
         return self.front_axle_to_cg + self.rear_axle_to_cg
 
 
-class AbstractAxleForces(AbstractAxlePlaces):
-    """A car whose `mass` (kg) and `yaw_inertia` (kg m^2) give the forces of both axles."""
+class AbstractLinearAxles(AbstractTwoAxles):
+    """A car whose axles have the cornering stiffnesses `front_cornering_stiffness` and `rear_cornering_stiffness` (N/rad)."""
 
-    mass: eqx.AbstractVar[jax.Array]
-    yaw_inertia: eqx.AbstractVar[jax.Array]
+    front_cornering_stiffness: jax.Array = positive("N/rad")
+    rear_cornering_stiffness: jax.Array = positive("N/rad")
+
+
+def linear_axles_of(car: CarSpecification) -> dict[str, float]:
+    """The parameters of `AbstractLinearAxles` from a car's file, which has the stiffnesses or the axles' coefficients."""
+    return {field.name: getattr(car, field.name) for field in dataclasses.fields(AbstractLinearAxles)}
+
+
+class AbstractAxleForces(AbstractTwoAxles):
+    """A car whose `yaw_inertia` (kg m^2) gives the forces of both axles."""
+
+    yaw_inertia: jax.Array = positive("kg m^2")
 
     def axle_forces(self, a_y: Any, yaw_acceleration: Any) -> tuple[Any, Any]:
         """Lateral forces of both axles (N) from the inertial sensors, by equation 15 of the review for small steer (F_yr has no

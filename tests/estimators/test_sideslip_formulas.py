@@ -11,7 +11,7 @@ from method_logs import CAR
 from scipy.linalg import expm
 
 from jaxveh import InputError, Recording, estimators, vehicles
-from jaxveh.estimators import kit, sideslip
+from jaxveh.estimators import kit, sideslip, two_axles
 from jaxveh.estimators.sideslip_methods import common, fusion, steady_state
 from jaxveh.estimators.sideslip_methods.single_track import LateralState
 from jaxveh.estimators.sideslip_methods.stiff_step import StiffStep, solve
@@ -104,7 +104,7 @@ def test_steady_formulas_are_the_gains_of_the_linear_single_track():
 
 
 def test_a_car_near_its_critical_speed_has_no_steady_turn():
-    numbers = steady_state.numbers(CAR) | {"front_stiffness": 2.5e5, "rear_stiffness": 1.0e5}
+    numbers = two_axles.linear_axles_of(CAR) | {"front_cornering_stiffness": 2.5e5, "rear_cornering_stiffness": 1.0e5}
     oversteers = common.guard(CAR, steady_state.SteadySteer(**numbers))
     time = np.linspace(0.0, 0.1, 11)
     found = [sideslip.estimate(oversteers, log(time, oversteers, v_x=v, steer=1e-4)) for v in (10.0, 40.0)]
@@ -167,7 +167,7 @@ def test_pseudo_integration_is_a_first_order_filter_and_its_complement():
 
 def test_the_switch_integrates_where_tyres_are_not_to_be_trusted_and_not_on_a_bank():
     time = np.linspace(0.0, 2.0, 201)
-    steady = steady_state.SteadySteer(**steady_state.numbers(CAR))
+    steady = steady_state.SteadySteer(**two_axles.linear_axles_of(CAR))
     method = fusion.Switched(saying(0.3), steady)
     a_y = np.where(time < 1.0, 3.0, 5.0)
     asked = 3.0 / float(linear_car().lateral_acceleration_gain(V))

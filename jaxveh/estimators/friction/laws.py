@@ -62,10 +62,6 @@ class PlanarCar(AbstractAxleForces):
 
     front: SimilarCurve
     rear: SimilarCurve
-    mass: jax.Array = positive("kg")
-    yaw_inertia: jax.Array = positive("kg m^2")
-    front_axle_to_cg: jax.Array = positive("m")
-    rear_axle_to_cg: jax.Array = positive("m")
     cg_height: jax.Array = parameter("m", scale=0.5)
     half_track: jax.Array = positive("m")
     front_drive: jax.Array = parameter("-", scale=0.5)

@@ -5,11 +5,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 
-from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractMethod, Answer, Filtered
@@ -17,6 +14,7 @@ from jaxveh.estimators.navigation.of_car import satellite_lag
 from jaxveh.filters import Delayed, Extended
 from jaxveh.io import CarSpecification
 from jaxveh.statespace import Continuous, Gaussian, Prior, StateSpace
+from jaxveh.vehicles import LinearSingleTrack
 
 SLOWEST = 3.0
 """m/s: a slower single track is computed at this speed, where the steer has little influence; sideslip is then not known."""
@@ -54,40 +52,11 @@ class TrackReport(NamedTuple):
     steer_offset: Any
 
 
-class LinearTrack(eqx.Module):
-    """The linear single track: `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg` (kg, kg m^2, m) and the axles'
-    cornering stiffnesses (N/rad)."""
-
-    mass: jax.Array = positive("kg")
-    yaw_inertia: jax.Array = positive("kg m^2")
-    front_axle_to_cg: jax.Array = positive("m")
-    rear_axle_to_cg: jax.Array = positive("m")
-    front_stiffness: jax.Array = positive("N/rad")
-    rear_stiffness: jax.Array = positive("N/rad")
-
-    def __check_init__(self):
-        check_parameters(self)
-
-    def matrices(self, v) -> tuple[Any, ...]:
-        """The coefficients a_11, a_12, a_21, a_22, b_1, b_2 of sideslip and yaw rate at a speed `v` (m/s)."""
-        m, J, a, b = self.mass, self.yaw_inertia, self.front_axle_to_cg, self.rear_axle_to_cg
-        C_f, C_r = self.front_stiffness, self.rear_stiffness
-        lever = b * C_r - a * C_f
-        return (
-            -(C_f + C_r) / (m * v),
-            lever / (m * v * v) - 1.0,
-            lever / J,
-            -(a * a * C_f + b * b * C_r) / (J * v),
-            C_f / (m * v),
-            a * C_f / J,
-        )
-
-
-def transition(system: LinearTrack, t0, t1, x: Track, u) -> Track:
+def transition(system: LinearSingleTrack, t0, t1, x: Track, u) -> Track:
     """The state after a step by the trapezoidal rule, which is stable at any speed and for any step."""
     half = 0.5 * (t1 - t0)
     v = jnp.maximum(jnp.abs(u.v_x), SLOWEST)
-    a_11, a_12, a_21, a_22, b_1, b_2 = system.matrices(v)
+    a_11, a_12, a_21, a_22, b_1, b_2, _ = system.system(v)
     steer = u.steer - x.steer_offset
     right_1 = x.sideslip + half * (a_11 * x.sideslip + a_12 * x.yaw_rate + 2.0 * b_1 * steer)
     right_2 = x.yaw_rate + half * (a_21 * x.sideslip + a_22 * x.yaw_rate + 2.0 * b_2 * steer)
@@ -110,13 +79,13 @@ class Seen(NamedTuple):
     course: Any
 
 
-def observation(system: LinearTrack, t, x: Track, u) -> Seen:
+def observation(system: LinearSingleTrack, t, x: Track, u) -> Seen:
     """The yaw rate plus its bias, and the course, which is yaw plus sideslip."""
     del system, t, u
     return Seen(x.yaw_rate + x.bias_yaw_rate, x.yaw + x.sideslip + x.slip_error)
 
 
-def report(system: LinearTrack, t, x: Track, u) -> TrackReport:
+def report(system: LinearSingleTrack, t, x: Track, u) -> TrackReport:
     """The outputs of the filter."""
     del system, t
     v_x, sideslip = u.v_x + 0.0 * x.sideslip, x.sideslip + x.slip_error
@@ -198,7 +167,7 @@ def multi_rate_of(car: CarSpecification) -> MultiRate:
     numbers = ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg")
     stiffness = {f"{axle}_stiffness": getattr(car, f"{axle}_cornering_stiffness") for axle in ("front", "rear")}
     model = StateSpace(
-        system=LinearTrack(**{name: getattr(car, name) for name in numbers}, **stiffness),
+        system=LinearSingleTrack(**{name: getattr(car, name) for name in numbers}, **stiffness),
         transition=transition,
         observation=observation,
         report=report,

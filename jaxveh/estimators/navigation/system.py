@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.navigation.window import rotate
-from jaxveh.estimators.two_axles import AbstractAxlePlaces
+from jaxveh.estimators.two_axles import AbstractTwoAxles
 from jaxveh.vehicles import GRAVITY
 
 SLOWEST = 0.5
@@ -36,7 +36,7 @@ PLAIN = Parts()
 """Three axes and satellites only."""
 
 
-class Navigator(AbstractAxlePlaces):
+class Navigator(AbstractTwoAxles):
     """An inertial unit on a car with satellite navigation.
 
     - `lag` (s): delay of the satellites beyond that of the inertial unit; `sensor_lag` (s): delay of the inertial unit, its

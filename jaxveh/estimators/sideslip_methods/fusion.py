@@ -25,7 +25,8 @@ from jaxveh.estimators.sideslip_methods.common import (
 )
 from jaxveh.estimators.sideslip_methods.kinematic import kinematic_kalman
 from jaxveh.estimators.sideslip_methods.single_track import single_track_filter
-from jaxveh.estimators.sideslip_methods.steady_state import SteadySteer, numbers
+from jaxveh.estimators.sideslip_methods.steady_state import SteadySteer
+from jaxveh.estimators.two_axles import linear_axles_of
 from jaxveh.io import CarSpecification
 
 HARD = 4.0
@@ -201,7 +202,7 @@ def pseudo_integration(car: CarSpecification) -> Guarded:
 
 def by_switch(car: CarSpecification) -> Guarded:
     """Makes the switch with the extended filter of the single track from a car's file."""
-    steady = SteadySteer(**numbers(car), steer_offset=-(car.steer_offset or 0.0))
+    steady = SteadySteer(**linear_axles_of(car), steer_offset=-(car.steer_offset or 0.0))
     inner = Switched(EXTENDED(car), steady, bank_time=BANK_TIME * size_of(car) ** 0.5)
     return guard(car, inner, SENSORS)
 

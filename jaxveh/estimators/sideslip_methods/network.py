@@ -23,7 +23,7 @@ from jaxveh.estimators.sideslip_methods.common import (
     sideslip_answer,
     slowest_of,
 )
-from jaxveh.estimators.sideslip_methods.steady_state import numbers
+from jaxveh.estimators.two_axles import linear_axles_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -121,12 +121,12 @@ def trained_arrays() -> tuple[np.ndarray, ...]:
 
 def sideslip_network(car: CarSpecification, layers: eqx.nn.MLP) -> SideslipNetwork:
     """The method with these `layers` for a car's file."""
-    told = numbers(car)
+    told = linear_axles_of(car)
     wheelbase = told["front_axle_to_cg"] + told["rear_axle_to_cg"]
     compliance = lambda other, stiffness: told["mass"] * told[other] / (wheelbase * told[stiffness])
     return SideslipNetwork(
-        layers, told["front_axle_to_cg"], told["rear_axle_to_cg"], compliance("rear_axle_to_cg", "front_stiffness"),
-        compliance("front_axle_to_cg", "rear_stiffness"), slowest_of(car), -(car.steer_offset or 0.0),
+        layers, told["front_axle_to_cg"], told["rear_axle_to_cg"], compliance("rear_axle_to_cg", "front_cornering_stiffness"),
+        compliance("front_axle_to_cg", "rear_cornering_stiffness"), slowest_of(car), -(car.steer_offset or 0.0),
     )  # fmt: skip
 
 

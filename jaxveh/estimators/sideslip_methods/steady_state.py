@@ -6,10 +6,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import parameter, positive
+from jaxveh._core.parameter import parameter
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.sideslip_methods.common import A_Y, STEER, V_X, YAW_RATE, Guarded, guard, sideslip_answer
-from jaxveh.estimators.two_axles import AbstractAxlePlaces
+from jaxveh.estimators.two_axles import AbstractLinearAxles, linear_axles_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -22,14 +22,8 @@ LEAST_STEADINESS = 0.2
 turn."""
 
 
-class AbstractSteadyState(AbstractAxlePlaces, AbstractMethod):
-    """The linear single track's parameters: `mass` (kg), distances of the axles (m), their cornering stiffnesses (N/rad)."""
-
-    mass: jax.Array = positive("kg")
-    front_axle_to_cg: jax.Array = positive("m")
-    rear_axle_to_cg: jax.Array = positive("m")
-    front_stiffness: jax.Array = positive("N/rad")
-    rear_stiffness: jax.Array = positive("N/rad")
+class AbstractSteadyState(AbstractLinearAxles, AbstractMethod):
+    """A formula of the linear single track in a steady turn."""
 
     def first(self, t, values):
         return self.next((), t, values)
@@ -52,8 +46,11 @@ class SteadySteer(AbstractSteadyState):
 
     def turn_of_steer(self, v_x, steer):
         """The steer of a neutral car in the same turn (rad), and whether there is a steady turn at all."""
-        leverage = self.front_axle_to_cg * self.front_stiffness - self.rear_axle_to_cg * self.rear_stiffness
-        stiff = self.wheelbase**2 * self.front_stiffness * self.rear_stiffness
+        leverage = (
+            self.front_axle_to_cg * self.front_cornering_stiffness
+            - self.rear_axle_to_cg * self.rear_cornering_stiffness
+        )
+        stiff = self.wheelbase**2 * self.front_cornering_stiffness * self.rear_cornering_stiffness
         steadiness = 1.0 - self.mass * jnp.square(v_x) * leverage / stiff
         steady = steadiness >= LEAST_STEADINESS
         return (steer + self.steer_offset) / jnp.where(steady, steadiness, 1.0), steady
@@ -68,7 +65,7 @@ class SteadySteer(AbstractSteadyState):
         length, a, b = self.wheelbase, self.front_axle_to_cg, self.rear_axle_to_cg
         turning, steady = self.turn_of_steer(v_x, steer)
         square = self.mass * jnp.square(v_x)
-        sideslip = (1.0 - square * a / (b * self.rear_stiffness * length)) * (b / length) * turning
+        sideslip = (1.0 - square * a / (b * self.rear_cornering_stiffness * length)) * (b / length) * turning
         linear = jnp.abs(self.asked_acceleration(v_x, steer)) <= LINEAR * GRAVITY
         bounded = jnp.clip(sideslip, -1.0, 1.0)
         return memory, sideslip_answer(v_x * numerics.tan(bounded), v_x, steady & linear & (bounded == sideslip))
@@ -90,30 +87,16 @@ class SteadyTurn(AbstractSteadyState):
     def next(self, memory, t, values):
         del t
         v_x, a_y = values["v_x"], values["a_y"]
-        slip = self.mass * self.front_axle_to_cg / (self.wheelbase * self.rear_stiffness) * a_y
+        slip = self.mass * self.front_axle_to_cg / (self.wheelbase * self.rear_cornering_stiffness) * a_y
         v_y = self.rear_axle_to_cg * values["yaw_rate"] - slip * v_x
         return memory, sideslip_answer(v_y, v_x, jnp.abs(a_y) <= LINEAR * GRAVITY)
 
 
-def numbers(car: CarSpecification) -> dict[str, float]:
-    """The linear single track's parameters from a car's file."""
-    assert (
-        car.front_cornering_stiffness is not None and car.rear_cornering_stiffness is not None
-    )  # given in the file, or from the axle's coefficients
-    return dict(
-        mass=car.mass,
-        front_axle_to_cg=car.front_axle_to_cg,
-        rear_axle_to_cg=car.rear_axle_to_cg,
-        front_stiffness=car.front_cornering_stiffness,
-        rear_stiffness=car.rear_cornering_stiffness,
-    )
-
-
 def steady_steer(car: CarSpecification) -> Guarded:
     """Makes eq 1 from a car's file."""
-    return guard(car, SteadySteer(**numbers(car), steer_offset=-(car.steer_offset or 0.0)))
+    return guard(car, SteadySteer(**linear_axles_of(car), steer_offset=-(car.steer_offset or 0.0)))
 
 
 def steady_turn(car: CarSpecification) -> Guarded:
     """Makes eq 2 from a car's file."""
-    return guard(car, SteadyTurn(**numbers(car)), (YAW_RATE, A_Y), (YAW_RATE, A_Y))
+    return guard(car, SteadyTurn(**linear_axles_of(car)), (YAW_RATE, A_Y), (YAW_RATE, A_Y))

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import number_of
-from jaxveh.estimators.two_axles import AbstractAxlePlaces
+from jaxveh.estimators.two_axles import AbstractLinearAxles, linear_axles_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -20,14 +20,9 @@ TYPICAL = {
 """Defaults for values that a car's file lacks: height, tracks and radius over the wheelbase, the drag over the mass (1/m)."""
 
 
-class SpeedCar(AbstractAxlePlaces):
-    """Mass (kg), lengths (m), cornering stiffnesses of the axles (N/rad) and shares (-) from a car's file."""
+class SpeedCar(AbstractLinearAxles):
+    """Lengths (m), drag (N s^2/m^2), shares (-) and the steering of a car's file, beside its mass and axles."""
 
-    mass: jax.Array = positive("kg")
-    front_axle_to_cg: jax.Array = positive("m")
-    rear_axle_to_cg: jax.Array = positive("m")
-    front_cornering_stiffness: jax.Array = positive("N/rad")
-    rear_cornering_stiffness: jax.Array = positive("N/rad")
     cg_height: jax.Array = parameter("m", scale=0.5)
     track_front: jax.Array = positive("m")
     track_rear: jax.Array = positive("m")
@@ -59,11 +54,7 @@ def speed_car(car: CarSpecification) -> SpeedCar:
     told = {name: getattr(car, name) for name in TYPICAL}
     numbers = {n: share * scale.get(n, 1.0) if told[n] is None else told[n] for n, share in TYPICAL.items()}
     return SpeedCar(
-        mass=car.mass,
-        front_axle_to_cg=car.front_axle_to_cg,
-        rear_axle_to_cg=car.rear_axle_to_cg,
-        front_cornering_stiffness=car.front_cornering_stiffness,
-        rear_cornering_stiffness=car.rear_cornering_stiffness,
+        **linear_axles_of(car),
         steering_ratio=16.0 if car.steering_ratio is None else car.steering_ratio,
         steer_offset=0.0 if car.steer_offset is None else car.steer_offset,
         **numbers,

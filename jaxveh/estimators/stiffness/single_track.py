@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -10,29 +9,29 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.two_axles import LATERAL, LONGEST, LOWEST, AbstractAxleForces
+from jaxveh.estimators.two_axles import (
+    LATERAL,
+    LONGEST,
+    LOWEST,
+    AbstractAxleForces,
+    AbstractLinearAxles,
+    linear_axles_of,
+)
 from jaxveh.io import CarSpecification
 
 LEAN = 0.059
 """Relative increase of the measured lateral acceleration because the body leans, for an ordinary car."""
 
 
-class LinearCar(AbstractAxleForces):
-    """The parameters of a linear single track; the methods start from its stiffnesses (N/rad, of the axles)."""
+class LinearCar(AbstractAxleForces, AbstractLinearAxles):
+    """The parameters of a linear single track; the methods start from its stiffnesses. `steer_offset` (rad): of the channel."""
 
-    mass: jax.Array = positive("kg")
-    yaw_inertia: jax.Array = positive("kg m^2")
-    front_axle_to_cg: jax.Array = positive("m")
-    rear_axle_to_cg: jax.Array = positive("m")
-    front_cornering_stiffness: jax.Array = positive("N/rad")
-    rear_cornering_stiffness: jax.Array = positive("N/rad")
     steer_offset: jax.Array = parameter("rad", scale=0.002, default=0.0)
 
 
 def linear_car(car: CarSpecification) -> LinearCar:
     """The linear single track of a car's file."""
-    names = [field.name for field in dataclasses.fields(LinearCar) if field.name != "steer_offset"]
-    return LinearCar(**{name: getattr(car, name) for name in names}, steer_offset=car.steer_offset or 0.0)
+    return LinearCar(**linear_axles_of(car), yaw_inertia=car.yaw_inertia, steer_offset=car.steer_offset or 0.0)
 
 
 class Signals(NamedTuple):
