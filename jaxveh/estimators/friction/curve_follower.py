@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import positive
-from jaxveh.estimators.friction.scalar import HIGHEST_FRICTION, LOWEST_FRICTION
+from jaxveh.estimators.friction.scalar import HIGHEST_FRICTION, LOWEST_FRICTION, AbstractFollower
 
 
 class CurveBelief(NamedTuple):
@@ -32,26 +31,16 @@ class CurveBelief(NamedTuple):
         return (self.mean[1], self.mean[2])
 
 
-class CurveFollower(eqx.Module):
-    """A Kalman filter of ln mu, like `scalar.Follower`, that also estimates the stiffnesses: a force below the file's curve means
-    a softer tyre or a slippery road, and the two can only be distinguished where the curve bends.
+class CurveFollower(AbstractFollower):
+    """The filter of ln mu that also estimates the stiffnesses: a force below the file's curve means a softer tyre or a slippery
+    road, and the two can only be distinguished where the curve bends.
 
-    Every row updates the stiffness; rows where the curve bends also update the friction. Without information friction returns to
-    `usual` (-) within `memory` (s), and stiffness to the file's within `stiffness_memory` (s), with standard deviations of the
-    logarithms of `spread` (-) and `stiffness_spread` (-). `correlation` (s): residuals closer than this are fully correlated;
-    `known` (-): up to this standard deviation of ln mu the friction is known; `surprise` (-): limit of the averaged squared
-    innovations over their variance, above which friction is forgotten; `attention` (s): time constant of this average.
+    Every row updates the stiffness; rows where the curve bends also update the friction. Without information stiffness returns
+    to the file's within `stiffness_memory` (s), with a standard deviation of its logarithm of `stiffness_spread` (-).
     """
 
-    usual: jax.Array = positive("-", default=0.8)
-    spread: jax.Array = positive("-", default=0.6)
-    memory: jax.Array = positive("s", default=40.0)
     stiffness_spread: jax.Array = positive("-", default=0.35)
     stiffness_memory: jax.Array = positive("s", default=100.0)
-    correlation: jax.Array = positive("s", default=0.2)
-    known: jax.Array = positive("-", default=0.15)
-    surprise: jax.Array = positive("-", default=6.0)
-    attention: jax.Array = positive("s", default=0.3)
 
     def start(self) -> CurveBelief:
         """The belief before any information."""
@@ -70,12 +59,9 @@ class CurveFollower(eqx.Module):
         for `noise` (its standard deviation); `here`: whether it was measured; `tells`: whether it may update the friction."""
         mean, P = self._ahead(last, dt)
         error, slope = jax.value_and_grad(residual)(mean)
-        rough = jnp.square(noise) * jnp.maximum(self.correlation / jnp.maximum(dt, 1e-3), 1.0)
-        expected = slope @ P @ slope
-        squared = jnp.square(error) / (expected + jnp.square(noise))
-        share = 1.0 - jnp.exp(-dt / self.attention)
-        average = last.surprise + jnp.where(here & tells, share, 0.0) * (jnp.minimum(squared, 50.0) - last.surprise)
-        jumped = here & tells & (average > self.surprise)
+        rough = self.noise_variance(noise, dt)
+        expected = slope @ P @ slope + jnp.square(noise)
+        average, jumped = self.watch(last.surprise, error, expected, dt, here & tells)
         P = jnp.where(jumped, self._forgets_friction(P), P)
         along = P @ slope
         gain = jnp.where(here, -along / (slope @ along + rough), 0.0)

@@ -22,9 +22,9 @@ class LogFriction(NamedTuple):
     surprise: Any
 
 
-class Follower(eqx.Module):
-    """A Kalman filter of ln mu, which returns to the `usual` friction (-) within `memory` (s) where there is no information. Its
-    variance is reset where innovations are too large for it, so that a jump is followed.
+class AbstractFollower(eqx.Module):
+    """A Kalman filter of ln mu, which returns to the `usual` friction (-) within `memory` (s) where there is no information.
+    Friction is forgotten where innovations are too large for its variance, so that a jump is followed.
 
     `spread` (-): standard deviation of ln mu without information; `correlation` (s): residuals closer than this are fully
     correlated; `known` (-): up to this standard deviation of ln mu the friction is known; `surprise` (-): limit of the averaged
@@ -39,6 +39,23 @@ class Follower(eqx.Module):
     surprise: jax.Array = positive("-", default=6.0)
     attention: jax.Array = positive("s", default=0.3)
 
+    def noise_variance(self, noise, dt):
+        """The variance of a residual with the standard deviation `noise`, `dt` (s) after the last one, so that correlated ones
+        count as one."""
+        return jnp.square(noise) * jnp.maximum(self.correlation / jnp.maximum(dt, 1e-3), 1.0)
+
+    def watch(self, last, error, variance, dt, here):
+        """The averaged squares of `error` over its `variance`, after `last` of them and `dt` (s), and whether the friction has
+        jumped; `here`: whether the error counts."""
+        share = 1.0 - jnp.exp(-dt / self.attention)
+        squared = jnp.square(error) / variance
+        average = last + jnp.where(here, share, 0.0) * (jnp.minimum(squared, 50.0) - last)
+        return average, here & (average > self.surprise)
+
+
+class Follower(AbstractFollower):
+    """The filter of ln mu alone."""
+
     def start(self) -> LogFriction:
         """The belief before any information."""
         return LogFriction(jnp.log(self.usual), jnp.square(self.spread), jnp.ones_like(self.usual))
@@ -51,11 +68,9 @@ class Follower(eqx.Module):
         variance = stays**2 * last.variance + (1.0 - stays**2) * jnp.square(self.spread)
         slope_at = lambda x: jax.jvp(residual, (x,), (jnp.ones_like(x),))
         error, slope = slope_at(mean)
-        rough = jnp.square(noise) * jnp.maximum(self.correlation / jnp.maximum(dt, 1e-3), 1.0)
-        squared = jnp.square(error) / (jnp.square(slope) * variance + jnp.square(noise))
-        share = 1.0 - jnp.exp(-dt / self.attention)
-        average = last.surprise + jnp.where(here, share, 0.0) * (jnp.minimum(squared, 50.0) - last.surprise)
-        jumped = here & (average > self.surprise)
+        rough = self.noise_variance(noise, dt)
+        expected = jnp.square(slope) * variance + jnp.square(noise)
+        average, jumped = self.watch(last.surprise, error, expected, dt, here)
         variance = jnp.where(jumped, jnp.square(self.spread), variance)
         total = jnp.square(slope) * variance + rough
         gain = jnp.where(here, -variance * slope / total, 0.0)
