@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 
@@ -28,6 +29,20 @@ class Felt(NamedTuple):
     def speaks(self, t: Any) -> Any:
         """Whether the channel has a recent measurement."""
         return t - self.at <= PATIENCE
+
+
+class AbstractOffsetAndSlope(eqx.Module):
+    """What a filter assumes of two accelerations (m/s^2): the accelerometer's offset and the `slope`, gravity along the road.
+
+    `offset`, `slope` (m/s^2): standard deviations at the start; `offset_walk`, `slope_walk` (m/s^2 per root second): random
+    walks. The slope decays to zero with `slope_time` (s). The two are only distinguished by how fast they change.
+    """
+
+    slope: jax.Array = positive("m/s^2", default=0.3)
+    slope_time: jax.Array = positive("s", default=15.0)
+    slope_walk: jax.Array = positive("m/s^2/sqrt(s)", default=0.15)
+    offset: jax.Array = positive("m/s^2", default=0.12)
+    offset_walk: jax.Array = positive("m/s^2/sqrt(s)", default=2e-3)
 
 
 def never_felt(t: Any) -> Felt:

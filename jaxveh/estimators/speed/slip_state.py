@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.sequential import Belief
+from jaxveh.estimators.speed.accelerometer import AbstractOffsetAndSlope
 from jaxveh.estimators.speed.wheels import AT
 
 LEFT = np.array([1, -1, 1, -1])
@@ -72,13 +72,13 @@ class SpeedState(NamedTuple):
         return self.rolled / (1.0 + self.radius)
 
 
-class Spreads(eqx.Module):
+class Spreads(AbstractOffsetAndSlope):
     """Standard deviations of the prior, of the random walks, and of the measurements.
 
-    `slope_walk` and the other walks are per root second. The slope decays to zero with `slope_time` (s), a softness to the
-    file's with `softness_time` (s), with a random walk that keeps its standard deviation. `radius` (-) is that of each wheel's
-    own radius error; the common one has half of it; `sinking` (-) that of the state of this name. `wheel` (m/s) is the
-    quantisation of the sensor's teeth, `wheel_share` (-) is proportional to the speed.
+    Walks are per root second. A softness decays to the file's with `softness_time` (s), with a random walk that keeps its
+    standard deviation. `radius` (-) is that of each wheel's own radius error; the common one has half of it; `sinking` (-) that
+    of the state of this name. `wheel` (m/s) is the quantisation of the sensor's teeth, `wheel_share` (-) is proportional to the
+    speed.
 
     The following errors are correlated in time, so that `repeats` (-) samples count as one: `slip_share` (-), a share of the
     expected slip; `peak_slip` (-), unknown slip at a force equal to the load, which falls with the fourth power of the force;
@@ -87,11 +87,6 @@ class Spreads(eqx.Module):
     otherwise; `turn` (m/s per rad/s), error of the wheels' positions.
     """
 
-    slope: jax.Array = positive("m/s^2", default=0.3)
-    slope_time: jax.Array = positive("s", default=15.0)
-    slope_walk: jax.Array = positive("m/s^2/sqrt(s)", default=0.15)
-    offset: jax.Array = positive("m/s^2", default=0.12)
-    offset_walk: jax.Array = positive("m/s^2/sqrt(s)", default=2e-3)
     gain: jax.Array = positive("-", default=0.012)
     radius: jax.Array = positive("-", default=0.004)
     radius_walk: jax.Array = positive("1/sqrt(s)", default=1e-4)

@@ -11,7 +11,7 @@ from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.method import answer
 from jaxveh.estimators.sequential import Belief, innovation, predict, update
-from jaxveh.estimators.speed.accelerometer import A_X, Felt, never_felt
+from jaxveh.estimators.speed.accelerometer import A_X, AbstractOffsetAndSlope, Felt, never_felt
 from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, AbstractWheelMethod, Wheels
 from jaxveh.vehicles import GRAVITY
 
@@ -23,7 +23,7 @@ class Weighed(NamedTuple):
     felt: Felt
 
 
-class Weighted(AbstractWheelMethod):
+class Weighted(AbstractWheelMethod, AbstractOffsetAndSlope):
     """A Kalman filter of [v_x, offset, slope], driven by the accelerometer, with the wheels' mean as measurement.
 
         dv_x/dt = a_x - offset - slope,    doffset/dt = noise,    dslope/dt = -slope / slope_time + noise
@@ -32,9 +32,9 @@ class Weighted(AbstractWheelMethod):
     `wheel` (m/s), `share` (-) of the mean, `by_acceleration` (s) times |a_x|, and `by_spread` (-) times the difference of fastest
     and slowest. Without an accelerometer measurement the speed is a random walk with `unfelt_walk` (m/s/sqrt(s)).
 
-    The speed is known where its standard deviation is below `agreement` (-) of the speed plus `agreement_speed` (m/s). Slope and
-    offset are only distinguished by how fast they change. The reported standard deviation also includes `radius` (-) of the
-    speed, the common error of all wheels' radii. It does not include slip that all wheels share, and is too small then.
+    The speed is known where its standard deviation is below `agreement` (-) of the speed plus `agreement_speed` (m/s). The
+    reported standard deviation also includes `radius` (-) of the speed, the common error of all wheels' radii. It does not
+    include slip that all wheels share, and is too small then.
 
     Chen, Gao, Xu 2013, section 2.1, refs 90 to 92.
     """
@@ -45,10 +45,6 @@ class Weighted(AbstractWheelMethod):
     by_spread: jax.Array = positive("-", default=1.0)
     a_x: jax.Array = positive("m/s/sqrt(s)", default=0.02)
     unfelt_walk: jax.Array = positive("m/s/sqrt(s)", default=2.0)
-    offset: jax.Array = positive("m/s^2", default=0.12)
-    offset_walk: jax.Array = positive("m/s^2/sqrt(s)", default=2e-3)
-    slope: jax.Array = positive("m/s^2", default=0.3)
-    slope_time: jax.Array = positive("s", default=15.0)
     slope_walk: jax.Array = positive("m/s^2/sqrt(s)", default=0.1)
     radius: jax.Array = positive("-", default=0.015)
 

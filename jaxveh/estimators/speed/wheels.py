@@ -139,11 +139,10 @@ class AbstractWheelMethod(AbstractMethod):
         return (wheels, own), answer({"v_x": v_x}, known=known)
 
 
-class AbstractOneWheel(AbstractWheelMethod):
+class AbstractChosenWheel(AbstractWheelMethod):
     """The speed of one of the four wheels, chosen in each row; the last speed is held where no wheel has a measurement.
 
-    It is known where the wheels agree and their rate is possible for a car, between `-most_deceleration` and `most_acceleration`
-    (m/s^2): if all wheels slip alike, they also agree.
+    The rates that a car can have are between `-most_deceleration` and `most_acceleration` (m/s^2).
     """
 
     most_deceleration: jax.Array = positive("m/s^2", default=10.0)
@@ -151,7 +150,12 @@ class AbstractOneWheel(AbstractWheelMethod):
 
     @abc.abstractmethod
     def choose(self, wheels: Wheels) -> Any:
-        """The speed of the chosen wheel, m/s."""
+        """The speed of the chosen wheel, or between two, m/s."""
+
+
+class AbstractOneWheel(AbstractChosenWheel):
+    """The chosen wheel's speed as it is, which is known where the wheels agree and a car can have their rate: if all wheels slip
+    alike, they also agree."""
 
     def begin(self, wheels, values):
         del values
@@ -179,20 +183,14 @@ class SlowestWheel(AbstractOneWheel):
         return wheels.slowest
 
 
-class AbstractSlopeLimited(AbstractWheelMethod):
-    """A wheel's speed, with its rate limited to what a car can reach in braking (`most_deceleration`, m/s^2) and in driving
-    (`most_acceleration`, m/s^2).
+class AbstractSlopeLimited(AbstractChosenWheel):
+    """The chosen wheel's speed, with its rate limited to those that a car can have.
 
     It is known where the wheels agree and neither limit was active in the last `patience` (s).
     """
 
-    most_deceleration: jax.Array = positive("m/s^2", default=10.0)
     most_acceleration: jax.Array = positive("m/s^2", default=5.0)
     patience: jax.Array = positive("s", default=0.3)
-
-    @abc.abstractmethod
-    def choose(self, wheels: Wheels) -> Any:
-        """The wheel speed to follow, m/s."""
 
     def begin(self, wheels, values):
         del values
