@@ -2,15 +2,49 @@
 
 from __future__ import annotations
 
+import abc
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
-from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.method import AbstractMethod, Answer, answer
 from jaxveh.estimators.stiffness.single_track import LEAN, Followed, LinearCar, Signals
 from jaxveh.estimators.two_axles import LATERAL
+
+
+class AbstractLeastSquares(AbstractMethod):
+    """A method on signals with the same low-pass filter, `followed`, that starts from the stiffnesses of a `car`. Its memory has
+    the signals in a field `signals`."""
+
+    car: LinearCar
+    followed: Followed
+
+    @property
+    def needs(self):
+        return LATERAL
+
+    @abc.abstractmethod
+    def begin(self, signals: Signals) -> Any:
+        """The memory after the first row."""
+
+    @abc.abstractmethod
+    def follow(self, memory: Any, now: Signals, dt: Any) -> Any:
+        """The memory after the next row, which counts as at most a second (`dt`, s) later."""
+
+    @abc.abstractmethod
+    def say(self, memory: Any) -> Answer:
+        """The answer to the row of this memory."""
+
+    def first(self, t, values):
+        memory = self.begin(self.followed.start(t, values))
+        return memory, self.say(memory)
+
+    def next(self, memory, t, values):
+        dt = jnp.clip(t - memory.signals.t, 0.0, 1.0)
+        memory = self.follow(memory, self.followed.next(memory.signals, t, values), dt)
+        return memory, self.say(memory)
 
 
 class ForcesMemory(NamedTuple):
@@ -21,7 +55,7 @@ class ForcesMemory(NamedTuple):
     covariance: Any
 
 
-class AxleForces(AbstractMethod):
+class AxleForces(AbstractLeastSquares):
     """Least squares on the axles' forces by equation 15 and the difference of their slip angles, with forgetting.
 
     `delta - l r / v = F_f / C_f - F_r / C_r + offset` holds without the lateral velocity, so that it needs no observer of it (the
@@ -35,26 +69,16 @@ class AxleForces(AbstractMethod):
     to this relative standard deviation a stiffness is known.
     """
 
-    car: LinearCar
-    followed: Followed
     memory: jax.Array = positive("s", default=60.0)
     spread: jax.Array = positive("-", default=0.4)
     angle_noise: jax.Array = positive("rad", default=7e-4)
     correlation: jax.Array = positive("s", default=0.3)
     known_spread: jax.Array = positive("-", default=0.1)
 
-    @property
-    def needs(self):
-        return LATERAL
+    def begin(self, signals):
+        return ForcesMemory(signals, jnp.asarray([1.0, 1.0, 0.0, 0.0], self.spread.dtype), self._start())
 
-    def first(self, t, values):
-        signals = self.followed.start(t, values)
-        start = ForcesMemory(signals, jnp.asarray([1.0, 1.0, 0.0, 0.0], self.spread.dtype), self._start())
-        return start, self._answer(start)
-
-    def next(self, memory, t, values):
-        dt = jnp.clip(t - memory.signals.t, 0.0, 1.0)
-        now = self.followed.next(memory.signals, t, values)
+    def follow(self, memory, now, dt):
         turn = (now.yaw_rate - now.slow_yaw_rate) / self.followed.lag
         front, rear = self.car.axle_forces(now.slow_a_y / (1.0 + LEAN), turn)
         phi = jnp.stack([
@@ -72,15 +96,14 @@ class AxleForces(AbstractMethod):
         across = P @ phi
         gain = jnp.where(now.moves, across / (phi @ across + rough), 0.0)
         P = P - jnp.outer(gain, across)
-        after = ForcesMemory(now, mean + gain * (difference - phi @ mean), 0.5 * (P + P.T))
-        return after, self._answer(after)
+        return ForcesMemory(now, mean + gain * (difference - phi @ mean), 0.5 * (P + P.T))
 
     def _start(self):
         return jnp.diag(
             jnp.square(jnp.stack([self.spread, self.spread, 0.003 + 0.0 * self.spread, 0.01 + 0.0 * self.spread]))
         )
 
-    def _answer(self, memory: ForcesMemory):
+    def say(self, memory):
         compliance = jnp.clip(memory.mean[:2], 0.2, 5.0)
         std = jnp.sqrt(jnp.diagonal(memory.covariance))[:2]
         car, names = self.car, ("front_cornering_stiffness", "rear_cornering_stiffness")
@@ -105,7 +128,7 @@ class DerivativesMemory(NamedTuple):
     square: Any
 
 
-class Derivatives(AbstractMethod):
+class Derivatives(AbstractLeastSquares):
     """Stiffness by equation 16 as corrected, at constant speed: the derivative of a force over that of its slip angle.
 
         C_f = m l_r / l  (d a_f / dt) / (d delta / dt - a_f / v + r),    a_f = a_y + l_f dr/dt
@@ -120,25 +143,15 @@ class Derivatives(AbstractMethod):
     denominators in the window is above `enough` (-) times the square of epsilon.
     """
 
-    car: LinearCar
-    followed: Followed
     epsilon: jax.Array = positive("rad/s", default=0.01)
     memory: jax.Array = positive("s", default=30.0)
     enough: jax.Array = positive("-", default=0.1)
 
-    @property
-    def needs(self):
-        return LATERAL
+    def begin(self, signals):
+        two = jnp.zeros((2,), signals.t.dtype)
+        return DerivativesMemory(signals, two, two, two, two, two, two)
 
-    def first(self, t, values):
-        signals = self.followed.start(t, values)
-        two = jnp.zeros((2,), t.dtype)
-        start = DerivativesMemory(signals, two, two, two, two, two, two)
-        return start, self._answer(start)
-
-    def next(self, memory, t, values):
-        dt = jnp.clip(t - memory.signals.t, 0.0, 1.0)
-        now = self.followed.next(memory.signals, t, values)
+    def follow(self, memory, now, dt):
         lag = self.followed.lag
         turn = (now.yaw_rate - now.slow_yaw_rate) / lag
         a_y = now.slow_a_y / (1.0 + LEAN)
@@ -153,12 +166,11 @@ class Derivatives(AbstractMethod):
         counts = jnp.where(now.moves, angle**2 / (angle**2 + self.epsilon**2), 0.0)
         fades = jnp.exp(-dt / self.memory)
         gather = lambda old, new: fades * old + (1.0 - fades) * counts * new
-        after = DerivativesMemory(
+        return DerivativesMemory(
             now, felt, slow, raw, angle, gather(memory.product, angle * rate), gather(memory.square, angle**2)
         )
-        return after, self._answer(after)
 
-    def _answer(self, memory: DerivativesMemory):
+    def say(self, memory):
         car = self.car
         masses = car.mass / car.wheelbase * jnp.stack([car.rear_axle_to_cg, car.front_axle_to_cg])
         file = jnp.stack([car.front_cornering_stiffness, car.rear_cornering_stiffness])
