@@ -1,13 +1,16 @@
-"""What the modules of the quantities have in common: their functions `estimate` and `live`, made from the methods."""
+"""The functions that the modules of the quantities have in common: `estimate` and `live` of their methods, and `do_nothing`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
+import numpy as np
+
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.following import follow
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
+from jaxveh.io import CarSpecification
 
 
 class Estimate(Protocol):
@@ -32,6 +35,14 @@ class LiveOfSource(Protocol):
 
     def __call__(self, source: Any, *, method: str = ...) -> LiveMethod:
         """The quantity, one row at a time; `source` and `method` as in `Estimate`."""
+        ...
+
+
+class DoNothing(Protocol):
+    """The type of `do_nothing` of a quantity."""
+
+    def __call__(self, car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
+        """What a car's file says of the quantity without any method, (T,) by the names of `SHOWN`."""
         ...
 
 
@@ -70,6 +81,18 @@ def live_of(name: str, shown: Mapping[str, str], methods: Mapping[str, MethodOfC
 
     _describe(live, name, f"{_in_words(shown)}, one row at a time: the same answers as `estimate`.\n\n{ARGUMENTS}")
     return live
+
+
+def constant_of(name: str, values: Callable[[CarSpecification], Mapping[str, float | None]], text: str) -> DoNothing:
+    """The function `do_nothing` of the module of a quantity: the same `values` of a car's file, by name, in every row; None is
+    NaN. `text` says what they are."""
+
+    def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
+        told = {field: np.nan if value is None else value for field, value in values(car).items()}
+        return {field: np.full(len(recording), value) for field, value in told.items()}
+
+    _describe(do_nothing, name, text)
+    return do_nothing
 
 
 def _in_words(shown: Mapping[str, str]) -> str:

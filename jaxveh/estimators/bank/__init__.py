@@ -7,15 +7,11 @@ degrees.
 
 from __future__ import annotations
 
-import numpy as np
-
-from jaxveh._core.recording import Recording
 from jaxveh.estimators.bank.observers import disturbance_observer, unknown_input_observer
 from jaxveh.estimators.bank.tseng import tseng_of
 from jaxveh.estimators.leaning import leaning_filter
 from jaxveh.estimators.method import MethodOfCar
-from jaxveh.estimators.quantity import live_of, smoothable_estimate_of
-from jaxveh.io import CarSpecification
+from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
 
 NAME = "bank"
 
@@ -46,12 +42,6 @@ METHODS = {
 
 RECOMMENDED = "filter"
 
-
-def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """Zero bank in all rows."""
-    del car
-    return dict.fromkeys(SHOWN, np.zeros(len(recording)))
-
-
+do_nothing = constant_of(NAME, lambda car: {"bank": 0.0}, "Zero bank in all rows.")
 estimate = smoothable_estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)

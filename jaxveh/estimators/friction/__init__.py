@@ -8,10 +8,8 @@ force over the load. **It is not observable while the tyres work in their linear
 from __future__ import annotations
 
 import jax.numpy as jnp
-import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh._core.recording import Recording
 from jaxveh.estimators.body_motion import number_of
 from jaxveh.estimators.friction.along import AlongEvidence, WheelForces
 from jaxveh.estimators.friction.augmented import augmented_filter
@@ -24,7 +22,7 @@ from jaxveh.estimators.friction.slipping_wheels import SidesApart, WheelObserver
 from jaxveh.estimators.friction.stiffness_doubt import with_doubt
 from jaxveh.estimators.friction.wheels import Reconstruction, SlipSlope, WheelSlips
 from jaxveh.estimators.method import MethodOfCar
-from jaxveh.estimators.quantity import estimate_of, live_of
+from jaxveh.estimators.quantity import constant_of, estimate_of, live_of
 from jaxveh.io import CarSpecification
 from jaxveh.tyres import LuGre
 
@@ -137,12 +135,8 @@ METHODS = {
 
 RECOMMENDED = "bank"
 
-
-def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """Friction 1 in all rows: that of the road on which the tyre parameters hold."""
-    del car
-    return {"friction": np.ones(len(recording))}
-
-
+do_nothing = constant_of(
+    NAME, lambda car: {"friction": 1.0}, "Friction 1 in all rows: that of the road on which the tyre parameters hold."
+)
 estimate = estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)

@@ -7,14 +7,10 @@ in a file (`write_learned`, `read_learned`), from which the next drive starts (`
 
 from __future__ import annotations
 
-import numpy as np
-
-from jaxveh._core.recording import Recording
 from jaxveh.estimators.geometry.learned import Learned, numbers_learned, read_learned, start_from, write_learned
 from jaxveh.estimators.geometry.learner import UNITS, learner_of
 from jaxveh.estimators.method import MethodOfCar
-from jaxveh.estimators.quantity import estimate_of, live_of
-from jaxveh.io import CarSpecification
+from jaxveh.estimators.quantity import constant_of, estimate_of, live_of
 
 NAME = "geometry"
 
@@ -31,13 +27,11 @@ METHODS = {
 RECOMMENDED = "learner"
 
 
-def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """The values of the car's file; a missing offset is zero, a missing ratio NaN."""
-    told = {name: getattr(car, name) for name in SHOWN}
-    told |= {"steer_offset": told["steer_offset"] or 0.0}
-    return {name: np.full(len(recording), np.nan if value is None else value) for name, value in told.items()}
-
-
+do_nothing = constant_of(
+    NAME,
+    lambda car: {name: getattr(car, name) for name in SHOWN} | {"steer_offset": car.steer_offset or 0.0},
+    "The values of the car's file; a missing offset is zero, a missing ratio NaN.",
+)
 estimate = estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)
 

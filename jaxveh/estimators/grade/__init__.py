@@ -7,14 +7,10 @@ satellites.
 
 from __future__ import annotations
 
-import numpy as np
-
-from jaxveh._core.recording import Recording
 from jaxveh.estimators.grade.kinematic import Climb, kinematic_of, satellite_of
 from jaxveh.estimators.method import MethodOfCar
 from jaxveh.estimators.pulling import joint_filter, pulling_filter
-from jaxveh.estimators.quantity import live_of, smoothable_estimate_of
-from jaxveh.io import CarSpecification
+from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
 
 NAME = "grade"
 
@@ -46,12 +42,6 @@ METHODS = {
 
 RECOMMENDED = "filter"
 
-
-def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """Zero grade in all rows."""
-    del car
-    return dict.fromkeys(SHOWN, np.zeros(len(recording)))
-
-
+do_nothing = constant_of(NAME, lambda car: {"grade": 0.0}, "Zero grade in all rows.")
 estimate = smoothable_estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)

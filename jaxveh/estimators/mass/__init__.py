@@ -7,15 +7,11 @@ the mean stays.
 
 from __future__ import annotations
 
-import numpy as np
-
-from jaxveh._core.recording import Recording
 from jaxveh.estimators.mass.forgetting import forgetting_factors
 from jaxveh.estimators.mass.ratios import Gated, HighPass, KinematicGrade, ratio_of
 from jaxveh.estimators.method import MethodOfCar
 from jaxveh.estimators.pulling import joint_filter, pulling_filter
-from jaxveh.estimators.quantity import live_of, smoothable_estimate_of
-from jaxveh.io import CarSpecification
+from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
 
 NAME = "mass"
 
@@ -57,11 +53,6 @@ METHODS = {
 
 RECOMMENDED = "filter"
 
-
-def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """The mass of the car's file."""
-    return dict.fromkeys(SHOWN, np.full(len(recording), car.mass))
-
-
+do_nothing = constant_of(NAME, lambda car: {"mass": car.mass}, "The mass of the car's file.")
 estimate = smoothable_estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)

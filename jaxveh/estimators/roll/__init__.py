@@ -8,16 +8,12 @@ measures it less a share of the yaw rate if the car points up or down.
 
 from __future__ import annotations
 
-import numpy as np
-
-from jaxveh._core.recording import Recording
 from jaxveh.estimators.leaning import leaning_filter
 from jaxveh.estimators.method import MethodOfCar
-from jaxveh.estimators.quantity import live_of, smoothable_estimate_of
+from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
 from jaxveh.estimators.roll.gyro import gyro_of
 from jaxveh.estimators.roll.six_axis import six_axis_of
 from jaxveh.estimators.roll.suspension import springs_of, steady_of
-from jaxveh.io import CarSpecification
 
 NAME = "roll"
 
@@ -47,12 +43,6 @@ METHODS = {
 
 RECOMMENDED = "filter"
 
-
-def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """Zero roll and roll rate in all rows."""
-    del car
-    return dict.fromkeys(SHOWN, np.zeros(len(recording)))
-
-
+do_nothing = constant_of(NAME, lambda car: {"roll": 0.0, "roll_rate": 0.0}, "Zero roll and roll rate in all rows.")
 estimate = smoothable_estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)

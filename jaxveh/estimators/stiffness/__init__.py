@@ -6,15 +6,11 @@ camber thrust, compliance, roll steer. The methods start from the values of the 
 
 from __future__ import annotations
 
-import numpy as np
-
-from jaxveh._core.recording import Recording
 from jaxveh.estimators.method import MethodOfCar
-from jaxveh.estimators.quantity import live_of, smoothable_estimate_of
+from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
 from jaxveh.estimators.stiffness.least_squares import AxleForces, Derivatives
 from jaxveh.estimators.stiffness.single_track import Followed, linear_car
 from jaxveh.estimators.stiffness.walking import WalkingStiffness
-from jaxveh.io import CarSpecification
 
 NAME = "stiffness"
 
@@ -42,11 +38,8 @@ METHODS = {
 
 RECOMMENDED = "walking"
 
-
-def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """The stiffnesses of the car's file."""
-    return {name: np.full(len(recording), getattr(car, name)) for name in SHOWN}
-
-
+do_nothing = constant_of(
+    NAME, lambda car: {name: getattr(car, name) for name in SHOWN}, "The stiffnesses of the car's file."
+)
 estimate = smoothable_estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)
