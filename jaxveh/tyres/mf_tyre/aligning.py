@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import EPSILON, coefficient, cosine_curve, cosine_of_arctan, curvature, not_zero, sign
+from jaxveh.tyres.mf_tyre.section import AbstractSection
 
 
 class AligningParts(NamedTuple):
@@ -22,7 +21,7 @@ class AligningParts(NamedTuple):
     residual: Any
 
 
-class AligningCoefficients(eqx.Module):
+class AligningCoefficients(AbstractSection):
     """The section [ALIGNING_COEFFICIENTS].
 
     Trail: slope `QBZ1` to `QBZ5`, shape `QCZ1`, peak `QDZ1` to `QDZ4`, curvature `QEZ1` to `QEZ5`, shift `QHZ1` to `QHZ4`.
@@ -62,9 +61,6 @@ class AligningCoefficients(eqx.Module):
     SSZ2: jax.Array = coefficient(scale=0.05)
     SSZ3: jax.Array = coefficient()
     SSZ4: jax.Array = coefficient()
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def parts(self, at, scaling, structure, pure, K_xk, weight_y, forces) -> AligningParts:
         """M_z of combined slip.

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import (
     coefficient,
     cosine_of_arctan,
@@ -20,6 +18,7 @@ from jaxveh.tyres.mf_tyre.formula import (
     unless_zero,
     weight,
 )
+from jaxveh.tyres.mf_tyre.section import AbstractSection
 
 
 class PureLateral(NamedTuple):
@@ -34,7 +33,7 @@ class PureLateral(NamedTuple):
     S_V: Any
 
 
-class LateralCoefficients(eqx.Module):
+class LateralCoefficients(AbstractSection):
     """The section [LATERAL_COEFFICIENTS].
 
     Pure slip: shape `PCY1`; friction `PDY1` and its dependence on load (`2`) and camber squared (`3`); curvature `PEY1` and its
@@ -89,9 +88,6 @@ class LateralCoefficients(eqx.Module):
     RVY6: jax.Array = coefficient(scale=10.0)
     PTY1: jax.Array = coefficient()
     PTY2: jax.Array = coefficient(1.0)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @numerics.fence_results
     def pure(self, at, scaling, nominal_load, version: int) -> PureLateral:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import coefficient, cosine_of_arctan, curvature, not_zero, sign, sine_curve, weight
+from jaxveh.tyres.mf_tyre.section import AbstractSection
 
 
 class PureLongitudinal(NamedTuple):
@@ -21,7 +20,7 @@ class PureLongitudinal(NamedTuple):
     mu: Any
 
 
-class LongitudinalCoefficients(eqx.Module):
+class LongitudinalCoefficients(AbstractSection):
     """The section [LONGITUDINAL_COEFFICIENTS].
 
     Pure slip: shape `PCX1`; friction `PDX1` at nominal load and its dependence on load (`2`) and camber squared (`3`);
@@ -59,9 +58,6 @@ class LongitudinalCoefficients(eqx.Module):
     PTX1: jax.Array = coefficient()
     PTX2: jax.Array = coefficient()
     PTX3: jax.Array = coefficient()
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @numerics.fence_results
     def pure(self, at, scaling) -> PureLongitudinal:

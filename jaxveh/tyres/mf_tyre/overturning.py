@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import coefficient
+from jaxveh.tyres.mf_tyre.section import AbstractSection
 
 
-class OverturningCoefficients(eqx.Module):
+class OverturningCoefficients(AbstractSection):
     """The section [OVERTURNING_COEFFICIENTS]: `QSX1` to `QSX14`, pressure `PPMX1`."""
 
     QSX1: jax.Array = coefficient(scale=0.01)
@@ -29,9 +28,6 @@ class OverturningCoefficients(eqx.Module):
     QSX13: jax.Array = coefficient(scale=0.1)
     QSX14: jax.Array = coefficient()
     PPMX1: jax.Array = coefficient()
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def moment(self, at, scaling, structure, least_load, F_y):
         """M_x, N m; below `least_load` (N) the load in it is replaced by load^3 / least_load^2."""

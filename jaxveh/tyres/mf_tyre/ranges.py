@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import coefficient
+from jaxveh.tyres.mf_tyre.section import AbstractSection
 
 UNLIMITED = 1e10
 
 
-class Ranges(eqx.Module):
+class Ranges(AbstractSection):
     """The ranges of a property file: slip ratio `KPUMIN`, `KPUMAX` (-), slip angle `ALPMIN`, `ALPMAX` and camber `CAMMIN`,
     `CAMMAX` (rad), load `FZMIN`, `FZMAX` (N), pressure `PRESMIN`, `PRESMAX` (Pa), and the speed `VXLOW` (m/s) below which slip
     (unless a vehicle has regularised it) and shifts fade. They do not fade if `VXLOW` is zero or negative."""
@@ -31,9 +30,6 @@ class Ranges(eqx.Module):
     PRESMIN: jax.Array = coefficient(1.0, unit="Pa")
     PRESMAX: jax.Array = coefficient(UNLIMITED, unit="Pa")
     VXLOW: jax.Array = coefficient(1.0, unit="m/s")
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def fading_factors(self, slip_angle, speed):
         """The factors of slip ratio and slip angle, and the smooth factor of shifts; all fade below `VXLOW`."""

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import coefficient
+from jaxveh.tyres.mf_tyre.section import AbstractSection
 
 
-class RollingCoefficients(eqx.Module):
+class RollingCoefficients(AbstractSection):
     """The section [ROLLING_COEFFICIENTS].
 
     Constant part `QSY1`; dependence on F_x `QSY2`, on speed `QSY3`, `QSY4`, on camber `QSY5`, `QSY6`; exponents of load `QSY7`
@@ -28,9 +27,6 @@ class RollingCoefficients(eqx.Module):
     QSY6: jax.Array = coefficient()
     QSY7: jax.Array = coefficient(1.0)
     QSY8: jax.Array = coefficient()
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def moment(self, at, scaling, structure, ranges, version: int, F_x, load, slip_ratio):
         """M_y, N m, negative when rolling forward; `load` and `slip_ratio` are those of the contact, without limits."""

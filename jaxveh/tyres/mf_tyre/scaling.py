@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import equinox as eqx
 import jax
 
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.tyres.mf_tyre.formula import factor
+from jaxveh.tyres.mf_tyre.section import AbstractSection
 
 
-class Scaling(eqx.Module):
+class Scaling(AbstractSection):
     """The section [SCALING_COEFFICIENTS].
 
     Factors of nominal load (`LFZO`); shape, friction, curvature, stiffness and shifts of F_x (`LCX` to `LVX`) and F_y (`LCY` to
@@ -45,6 +45,3 @@ class Scaling(eqx.Module):
     LMP: jax.Array = factor()
     LSGKP: jax.Array = factor()
     LSGAL: jax.Array = factor()
-
-    def __check_init__(self):
-        check_parameters(self)

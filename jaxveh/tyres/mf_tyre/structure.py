@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.tyres.mf_tyre.formula import coefficient, unless_zero
+from jaxveh.tyres.mf_tyre.section import AbstractSection
 
 RADIUS_ITERATIONS = 12
 """Iterations for the rolling radius: it depends weakly on the wheel's speed, and that on the radius; 12 give full precision."""
@@ -24,7 +24,7 @@ class Wheel(NamedTuple):
     speed: Any
 
 
-class Structure(eqx.Module):
+class Structure(AbstractSection):
     """The entries of the sections [DIMENSION], [OPERATING_CONDITIONS], [VERTICAL], [STRUCTURAL] and [CONTACT_PATCH] that steady
     forces and relaxation need: radii, `WIDTH`, nominal load `FNOMIN` (N), pressure `NOMPRES` (Pa) and speed `LONGVL` (m/s),
     stiffnesses (N/m) and their dependence on load, speed, forces, pressure and, in 6.2, camber.
@@ -73,9 +73,6 @@ class Structure(eqx.Module):
     PCFY1: jax.Array = coefficient()
     PCFY2: jax.Array = coefficient()
     PCFY3: jax.Array = coefficient()
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def vertical_stiffness(self, dp_i):
         """Vertical stiffness at a pressure (A5), N/m."""

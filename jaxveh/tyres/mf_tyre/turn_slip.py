@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import (
     coefficient,
     cosine_of_arctan,
@@ -19,9 +17,10 @@ from jaxveh.tyres.mf_tyre.formula import (
     sine_curve,
     unless_zero,
 )
+from jaxveh.tyres.mf_tyre.section import AbstractSection
 
 
-class TurnSlip(eqx.Module):
+class TurnSlip(AbstractSection):
     """The section [TURNSLIP_COEFFICIENTS].
 
     Loss of F_x `PDXP1` to `PDXP3`, of F_y `PDYP1` to `PDYP4`, of cornering stiffness `PKYP1`, of trail `QDTP1`, of residual
@@ -47,9 +46,6 @@ class TurnSlip(eqx.Module):
     QCRP2: jax.Array = coefficient(0.1)
     QBRP1: jax.Array = coefficient(0.1)
     QDRP1: jax.Array = coefficient(1.0)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def spin(self, at, turn_slip, omega, radius, least_speed) -> Spin:
         """The spin and its factors at an operating point.
