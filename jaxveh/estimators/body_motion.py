@@ -11,12 +11,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractMethod, Answer
-from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY, regularised_speed
 
 AT = ("fl", "fr", "rl", "rr")
@@ -31,19 +29,6 @@ SILENCE = 0.5
 
 CRAWL = 2.0
 """m/s: below this speed, angles that are divided by it are regularised."""
-
-
-def number_of(car: CarSpecification, key: str, who: str, unit: str) -> float:
-    """A number of a car's file. **Raises** `InputError` naming key and unit where the file does not have it."""
-    value = getattr(car, key)
-    if value is None:
-        raise InputError(f"{who}: the car's file has no {key} ({unit}); give it.")
-    return value
-
-
-def numbers_in(car: CarSpecification, *keys: str) -> dict[str, float]:
-    """The numbers of a car's file by key, without those that the file does not have."""
-    return {key: value for key in keys if (value := getattr(car, key)) is not None}
 
 
 def hold(value: Any, last: Any) -> Any:

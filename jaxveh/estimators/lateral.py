@@ -8,7 +8,8 @@ import equinox as eqx
 import jax
 
 from jaxveh._core.parameter import check_parameters, parameter, positive
-from jaxveh.estimators.body_motion import BodyMotion, away_from_zero, number_of
+from jaxveh.estimators.body_motion import BodyMotion, away_from_zero
+from jaxveh.estimators.car_file import number_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 

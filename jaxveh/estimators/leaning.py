@@ -11,7 +11,8 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_from_zero, number_of, numbers_in
+from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_from_zero
+from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractSmoothable, answer

@@ -12,7 +12,7 @@ from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.names import record_type
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.body_motion import numbers_in
+from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Calibration, Need, check_needs, model_of, spans_of, start_of
 from jaxveh.estimators.live import AsItIs, Live
 from jaxveh.filters import AbstractFilter, Estimate, Unscented, run
@@ -49,12 +49,8 @@ def car_of(car: CarSpecification | Longitudinal) -> Longitudinal:
     """
     if isinstance(car, Longitudinal):
         return car
-    if car.wheel_radius is None:
-        raise InputError(
-            "mass_and_grade: the car's file has no wheel_radius (m), which converts a torque into a force; give it."
-        )
-    known = numbers_in(car, "wheel_inertia", "drag", "rolling_resistance")
-    return Longitudinal(car.mass, wheel_radius=car.wheel_radius, **known)
+    radius = number_of(car, "wheel_radius", "mass_and_grade", "m")
+    return Longitudinal(car.mass, wheel_radius=radius, **numbers_in(car, "wheel_inertia", "drag", "rolling_resistance"))
 
 
 def model(

@@ -13,16 +13,8 @@ from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators import mass_and_grade
-from jaxveh.estimators.body_motion import (
-    SILENCE,
-    SPEEDS,
-    BodyMotion,
-    away_from_zero,
-    driven_share,
-    hold,
-    number_of,
-    numbers_in,
-)
+from jaxveh.estimators.body_motion import SILENCE, SPEEDS, BodyMotion, away_from_zero, driven_share, hold
+from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.live import AbstractCleaning

@@ -270,7 +270,7 @@ def test_elimination_solves_a_system():
     ],
 )
 def test_what_a_car_s_file_lacks_is_named(name, key, unit):
-    with pytest.raises(InputError, match=rf"sideslip: .* needs {key} \({unit}\) of the car's file"):
+    with pytest.raises(InputError, match=rf"sideslip: .*: the car's file has no .*{key} \({unit}\)"):
         sideslip.METHODS[name].make(dataclasses.replace(CAR, **{key: None}))
 
 

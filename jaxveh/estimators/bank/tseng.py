@@ -8,15 +8,8 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
-from jaxveh.estimators.body_motion import (
-    CRAWL,
-    LATERAL,
-    SILENCE,
-    AbstractMotionMethod,
-    arcsin_of,
-    hold,
-    number_of,
-)
+from jaxveh.estimators.body_motion import CRAWL, LATERAL, SILENCE, AbstractMotionMethod, arcsin_of, hold
+from jaxveh.estimators.car_file import number_of
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import Lateral, lateral_of, motion_of
 from jaxveh.estimators.method import answer

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
-from jaxveh.estimators.body_motion import number_of
+from jaxveh.estimators.car_file import keys_of, number_of, numbers_in
 from jaxveh.estimators.friction.along import AlongEvidence, WheelForces
 from jaxveh.estimators.friction.augmented import augmented_filter
 from jaxveh.estimators.friction.axles import AligningTorque, Axles, HybridObserver, LateralCurve
@@ -35,13 +34,8 @@ COUNT, LEAST, MOST = 28, 0.1, 1.25
 
 
 def _wheels(car: CarSpecification, who: str) -> WheelForces:
-    for key, unit in (("wheel_radius", "m"), ("wheel_inertia", "kg m^2")):
-        if getattr(car, key) is None:
-            raise InputError(
-                f"friction: {who}: the car's file has no {key} ({unit}), which converts a torque to a force; give it."
-            )
-    rolling = 0.01 if car.rolling_resistance is None else car.rolling_resistance
-    return WheelForces(car.wheel_radius, car.wheel_inertia, rolling)
+    wheels = keys_of(car, f"friction: {who}", {"wheel_radius": "m", "wheel_inertia": "kg m^2"})
+    return WheelForces(**wheels, **numbers_in(car, "rolling_resistance"))
 
 
 def _slips(car: CarSpecification, who: str) -> WheelSlips:

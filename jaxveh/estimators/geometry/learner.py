@@ -10,7 +10,8 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.body_motion import SILENCE, away_from_zero, hold, number_of
+from jaxveh.estimators.body_motion import SILENCE, away_from_zero, hold
+from jaxveh.estimators.car_file import number_of
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.leaning import Leaning, leaning_filter
 from jaxveh.estimators.method import AbstractMethod, answer

@@ -11,7 +11,8 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.body_motion import SILENCE, AbstractMotionMethod, hold, number_of, numbers_in
+from jaxveh.estimators.body_motion import SILENCE, AbstractMotionMethod, hold
+from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import answer
 from jaxveh.estimators.pulling import JOINT, SLOWEST, WIDEST_MASS

@@ -9,7 +9,8 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
-from jaxveh.estimators.body_motion import SILENCE, hold, number_of
+from jaxveh.estimators.body_motion import SILENCE, hold
+from jaxveh.estimators.car_file import number_of
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.io import CarSpecification

@@ -10,7 +10,6 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
@@ -166,11 +165,3 @@ def joined_needs(*methods: AbstractMethod) -> tuple[Need, ...]:
         optional, throughout = need.optional and other.optional, need.throughout or other.throughout
         found[need.channel] = need._replace(optional=optional, throughout=throughout)
     return tuple(found.values())
-
-
-def keys_of(car: CarSpecification, who: str, keys: dict[str, str]) -> dict[str, float]:
-    """The values of these keys of a car's file; `keys` maps them to units. **Raises** `InputError` for keys that are missing."""
-    missing = [f"{key} ({unit})" for key, unit in keys.items() if getattr(car, key) is None]
-    if missing:
-        raise InputError(f"sideslip: {who} needs {', '.join(missing)} of the car's file; give it.")
-    return {key: getattr(car, key) for key in keys}

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 
 from jaxveh import filters, numerics, tyres
 from jaxveh._core.names import record, record_type
+from jaxveh.estimators.car_file import keys_of
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.sideslip_methods.common import (
     ROLL_RATE,
@@ -16,7 +17,6 @@ from jaxveh.estimators.sideslip_methods.common import (
     V_X,
     Guarded,
     guard,
-    keys_of,
     slowest_of,
     straight_steer,
 )
@@ -88,7 +88,7 @@ def car_numbers(car: CarSpecification, who: str, *, leaning: bool) -> CarNumbers
 
     **Raises** `InputError` for a file without a height of the centre of gravity, or tracks.
     """
-    keys_of(car, who, dict.fromkeys(("cg_height", "track_front", "track_rear"), "m"))
+    keys_of(car, f"sideslip: {who}", dict.fromkeys(("cg_height", "track_front", "track_rear"), "m"))
     found = numbers_of(car)
     if not leaning:
         return found

@@ -11,8 +11,9 @@ import jax
 from jaxveh import filters, numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import UNNAMED, positive
+from jaxveh.estimators.car_file import keys_of
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.sideslip_methods.common import Guarded, keys_of, slowest_of
+from jaxveh.estimators.sideslip_methods.common import Guarded, slowest_of
 from jaxveh.estimators.sideslip_methods.single_track import (
     LateralState,
     full_state,
@@ -86,7 +87,9 @@ def observation(system: MotorTrack, t, x, u):
 
 def motor_model(car: CarSpecification) -> StateSpace:
     """The state space of eq 10. **Raises** `InputError` for a file without tracks or wheel radius."""
-    keys = keys_of(car, "the moment of motors", dict.fromkeys(("track_front", "track_rear", "wheel_radius"), "m"))
+    keys = keys_of(
+        car, "sideslip: the moment of motors", dict.fromkeys(("track_front", "track_rear", "wheel_radius"), "m")
+    )
     plain = lateral_model(single_track(car), slowest_of(car))
     return StateSpace(
         system=MotorTrack(single_track(car), slowest_of(car), **keys),

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.car_file import keys_of
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.sideslip_methods.common import (
@@ -15,7 +16,6 @@ from jaxveh.estimators.sideslip_methods.common import (
     YAW_RATE,
     Guarded,
     guard,
-    keys_of,
     sideslip_answer,
     size_of,
 )
@@ -69,7 +69,7 @@ class SteeringTorque(AbstractMethod):
 
 def steering_torque(car: CarSpecification) -> Guarded:
     """Makes the method from a car's file. **Raises** `InputError` for a file without a steering ratio."""
-    keys = keys_of(car, "the steering torque", {"steering_ratio": "-"})
+    keys = keys_of(car, "sideslip: the steering torque", {"steering_ratio": "-"})
     front, _ = axles_of(single_track(car))
     method = SteeringTorque(
         car.front_axle_to_cg, front.stiffness, front.grip, keys["steering_ratio"], TRAIL * size_of(car),

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from jaxveh._core.recording import Recording
+from jaxveh.estimators.car_file import keys_of
 from jaxveh.estimators.method import MethodOfCar
 from jaxveh.estimators.quantity import estimate_of, live_of
 from jaxveh.estimators.speed.abs_peaks import AdaptiveNonlinear
 from jaxveh.estimators.speed.accelerometer import AccelerometerIntegral
-from jaxveh.estimators.speed.car_numbers import FORCE_KEYS, keys_of, speed_car
+from jaxveh.estimators.speed.car_numbers import FORCE_KEYS, speed_car
 from jaxveh.estimators.speed.forces import BrakeForces, MotorForces
 from jaxveh.estimators.speed.fuzzy import Fuzzy
 from jaxveh.estimators.speed.slip_aware import SlipAware
@@ -25,7 +26,7 @@ SHOWN = {"v_x": "m/s"}
 
 
 def _brake_forces(car: CarSpecification) -> BrakeForces:
-    return BrakeForces(**keys_of(car, "brake_force", FORCE_KEYS | {"brake_torque_per_pressure": "N m/Pa"}))
+    return BrakeForces(**keys_of(car, "speed, brake_force", FORCE_KEYS | {"brake_torque_per_pressure": "N m/Pa"}))
 
 
 def _slip_aware(car: CarSpecification) -> SlipAware:
@@ -73,7 +74,7 @@ METHODS = {
         "section 2.2, eq 11, refs 2, 94, 95",
     ),
     "motor_force": MethodOfCar(
-        lambda car: MotorForces(**keys_of(car, "motor_force", FORCE_KEYS)),
+        lambda car: MotorForces(**keys_of(car, "speed, motor_force", FORCE_KEYS)),
         "integral of the forces from the wheel motors' torques",
         "section 2.3, eq 12, refs 34, 83, 96",
     ),

@@ -8,7 +8,6 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.body_motion import number_of
 from jaxveh.estimators.two_axles import AbstractLinearAxles, linear_axles_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
@@ -69,11 +68,6 @@ FORCE_KEYS = {
     "rolling_resistance": "-",
 }
 """Keys of the values that convert torques at the wheels to a rate of the speed, and their units."""
-
-
-def keys_of(car: CarSpecification, who: str, keys: dict[str, str]) -> dict[str, float]:
-    """Values of the car's file by key. **Raises** `InputError` for a missing one, with its key and unit."""
-    return {name: number_of(car, name, f"speed, {who}", unit) for name, unit in keys.items()}
 
 
 def forces_of_axles(car: SpeedCar, push: Any) -> tuple[Any, Any]:
