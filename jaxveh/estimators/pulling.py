@@ -16,6 +16,7 @@ from jaxveh.estimators import mass_and_grade
 from jaxveh.estimators.body_motion import SILENCE, SPEEDS, BodyMotion, away_from_zero, driven_share, hold
 from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractSmoothable, Filtered, answer
@@ -61,7 +62,7 @@ class PullingMemory(NamedTuple):
     belief: Belief
 
 
-class Pulling(AbstractSmoothable):
+class Pulling(AbstractSmoothable, AbstractDriveForce):
     """Grade, mass and the accelerometer's offset, by an extended Kalman filter:
 
         d v_x = f_x + v_y r - g sin(grade),    f_x = (a_x - a_x_bias) / (1 + g pitch_gradient)
@@ -77,23 +78,18 @@ class Pulling(AbstractSmoothable):
     late on hills. Brake torques are assumed correct within a share `brake_doubt`. (A. Vahidi et al. 2005 and P. Lingman, B.
     Schmidtbauer 2003, with an accelerometer and its offset.)
 
-    **Parameters**: of the car `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2), `drag` (N s^2/m^2),
-    `rolling_resistance` (-), `rear_axle_to_cg`, `wheelbase` (m), `rear_compliance`, `pitch_gradient`
-    (rad/(m/s^2)); of the belief `mass_spread` (-), `grade_spread` (rad), `a_x_offset`, `a_x_offset_spread`, `rolling_spread`
-    (m/s^2); of the sensors `wheel_noise`, `told_noise` (of a channel `v_x` from another estimator, with correlated errors),
-    `satellite_noise`, `climb_noise` (m/s), `wheel_delay` and the satellites' `delay` (s),
-    `force_noise` (m/s^2), whose correlation time is `force_time` (s).
+    **Parameters**: of the car those of `AbstractDriveForce`, `mass` (kg), `rear_axle_to_cg`, `wheelbase` (m), `rear_compliance`,
+    `pitch_gradient` (rad/(m/s^2)); of the belief `mass_spread` (-), `grade_spread` (rad), `a_x_offset`, `a_x_offset_spread`,
+    `rolling_spread` (m/s^2); of the sensors `wheel_noise`, `told_noise` (of a channel `v_x` from another estimator, with
+    correlated errors), `satellite_noise`, `climb_noise` (m/s), `wheel_delay` and the satellites' `delay` (s), `force_noise`
+    (m/s^2), whose correlation time is `force_time` (s).
     """
 
     motion: BodyMotion
     mass: jax.Array = positive("kg")
-    wheel_radius: jax.Array = positive("m")
     rear_axle_to_cg: jax.Array = positive("m")
     wheelbase: jax.Array = positive("m")
     rear_compliance: jax.Array = parameter("rad/(m/s^2)", scale=0.01, default=0.0)
-    wheel_inertia: jax.Array = positive("kg m^2", default=1.2)
-    drag: jax.Array = parameter("N s^2/m^2", scale=0.4, default=0.4)
-    rolling_resistance: jax.Array = parameter("-", scale=0.01, default=0.012)
     pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005, default=0.0)
     mass_spread: jax.Array = positive("-", default=0.15)
     grade_spread: jax.Array = positive("rad", default=0.03)
@@ -196,8 +192,7 @@ class Pulling(AbstractSmoothable):
         turning = heard["a_y"] * self.rear_axle_to_cg / self.wheelbase * steer
 
         def balance(x):
-            force = (drive - brake) / self.wheel_radius - self.drag * v_x * jnp.abs(v_x)
-            force = force - 4.0 * self.wheel_inertia / jnp.square(self.wheel_radius) * self._speeds_up(x, heard)
+            force = self.drive_force(drive - brake, v_x, self._speeds_up(x, heard))
             pull = force * jnp.exp(-x.log_mass) / self.mass
             return self._felt(x, heard) - (pull - GRAVITY * self.rolling_resistance + x.rolling_bias - turning)
 

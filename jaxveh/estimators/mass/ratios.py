@@ -5,7 +5,6 @@ from __future__ import annotations
 import abc
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
@@ -13,6 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import SILENCE, AbstractMotionMethod, hold
 from jaxveh.estimators.car_file import number_of, numbers_in
+from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import answer
 from jaxveh.estimators.pulling import JOINT, SLOWEST, WIDEST_MASS
@@ -20,20 +20,14 @@ from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
 
-class Pull(eqx.Module):
-    """The longitudinal force on a car: torques over `wheel_radius` (m), air (`drag`, N s^2/m^2), rotation of the wheels
-    (`wheel_inertia`, kg m^2), `rolling_resistance` (-), `pitch_gradient` (rad/(m/s^2))."""
+class Pull(AbstractDriveForce):
+    """The longitudinal force on a car, and its `pitch_gradient` (rad/(m/s^2))."""
 
-    wheel_radius: jax.Array = positive("m")
-    wheel_inertia: jax.Array = positive("kg m^2", default=1.2)
-    drag: jax.Array = parameter("N s^2/m^2", scale=0.4, default=0.4)
-    rolling_resistance: jax.Array = parameter("-", scale=0.01, default=0.012)
     pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005, default=0.0)
 
     def force(self, drive: Any, brake: Any, heard: Any) -> Any:
         """Force along the road, N, without rolling resistance, which is proportional to the mass."""
-        spins = 4.0 * self.wheel_inertia / jnp.square(self.wheel_radius) * heard["v_x_rate"]
-        return (drive - brake) / self.wheel_radius - self.drag * heard["v_x"] * jnp.abs(heard["v_x"]) - spins
+        return self.drive_force(drive - brake, heard["v_x"], heard["v_x_rate"])
 
 
 class RatioMemory(NamedTuple):
@@ -162,7 +156,7 @@ class HighPass(AbstractRatio):
 def pull_of(car: CarSpecification, who: str) -> Pull:
     """Makes `Pull` from a car's file. **Raises** `InputError` for a file without `wheel_radius`."""
     known = numbers_in(car, "wheel_inertia", "drag", "rolling_resistance", "pitch_gradient")
-    return Pull(number_of(car, "wheel_radius", who, "m"), **known)
+    return Pull(wheel_radius=number_of(car, "wheel_radius", who, "m"), **known)
 
 
 def ratio_of(kind: type[AbstractRatio], car: CarSpecification, who: str) -> AbstractRatio:

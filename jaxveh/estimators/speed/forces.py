@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.parameter import parameter, positive
+from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.speed.accelerometer import Felt, never_felt
 from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, AbstractWheelMethod, Wheels
 from jaxveh.vehicles import GRAVITY
@@ -25,7 +26,7 @@ class Pushed(NamedTuple):
     alone: Any
 
 
-class AbstractForces(AbstractWheelMethod):
+class AbstractForces(AbstractWheelMethod, AbstractDriveForce):
     """`mass dv_x/dt = sum of the wheels' F_x - drag v_x |v_x|`, corrected by wheels that roll freely.
 
     Wheels roll freely where they agree and their mean rate is within `free_rate` (m/s^2) of that of the forces and below
@@ -37,9 +38,6 @@ class AbstractForces(AbstractWheelMethod):
 
     mass: jax.Array = positive("kg", default=1500.0)
     wheel_radius: jax.Array = positive("m", default=0.32)
-    wheel_inertia: jax.Array = positive("kg m^2", default=1.2)
-    drag: jax.Array = parameter("N s^2/m^2", scale=0.4, default=0.4)
-    rolling_resistance: jax.Array = parameter("-", scale=0.01, default=0.012)
     free_rate: jax.Array = positive("m/s^2", default=1.5)
     free_acceleration: jax.Array = positive("m/s^2", default=2.0)
     wheel_time: jax.Array = positive("s", default=0.05)
@@ -58,10 +56,6 @@ class AbstractForces(AbstractWheelMethod):
     @property
     def needs(self):
         return (*WHEEL_SPEEDS, *self.torques)
-
-    def spin_up(self, wheels: Wheels) -> Any:
-        """The force that accelerates the wheels' rotation, N."""
-        return self.wheel_inertia / jnp.square(self.wheel_radius) * 4.0 * wheels.mean_rate
 
     def rolls(self, wheels: Wheels) -> Any:
         """Rolling resistance of all wheels, N, against the direction of travel; it fades out at standstill."""
@@ -113,7 +107,7 @@ class BrakeForces(AbstractForces):
     def force(self, wheels, heard):
         braking = self.brake_torque_per_pressure * heard["brake_pressure"] * jnp.tanh(wheels.mean)
         torque = heard["drive_torque"] - braking
-        return torque / self.wheel_radius - self.spin_up(wheels) - self.rolls(wheels)
+        return torque / self.wheel_radius - self.spin_up(wheels.mean_rate) - self.rolls(wheels)
 
 
 class MotorForces(AbstractForces):
@@ -128,4 +122,4 @@ class MotorForces(AbstractForces):
 
     def force(self, wheels, heard):
         torque = sum(heard[need.channel] for need in self.torques)
-        return torque / self.wheel_radius - self.spin_up(wheels) - self.rolls(wheels)
+        return torque / self.wheel_radius - self.spin_up(wheels.mean_rate) - self.rolls(wheels)
