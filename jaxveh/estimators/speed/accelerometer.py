@@ -10,7 +10,8 @@ import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.speed.wheels import PATIENCE, WHEEL_SPEEDS, AbstractWheelMethod, Wheels
+from jaxveh.estimators.speed.free_wheels import AbstractFreeWheels
+from jaxveh.estimators.speed.wheels import PATIENCE, WHEEL_SPEEDS, Wheels
 
 A_X = Need("a_x", "m/s^2")
 
@@ -60,12 +61,11 @@ class Integrated(NamedTuple):
     alone: Any
 
 
-class AccelerometerIntegral(AbstractWheelMethod):
+class AccelerometerIntegral(AbstractFreeWheels):
     """The integral of the accelerometer less its offset, from the speed at which the wheels last rolled freely.
 
-    Wheels roll freely where they agree, their mean rate is within `free_rate` (m/s^2) of the measured acceleration, and this is
-    below `free_acceleration` (m/s^2). Then the speed follows their mean with the time constant `wheel_time` (s), and the offset,
-    which includes the slope of the road, is learned with `offset_time` (s) from the measured acceleration less the wheels' rate.
+    Where they roll freely, the offset, which includes the slope of the road, is learned with `offset_time` (s) from the measured
+    acceleration less the wheels' rate.
 
     The speed is known as long as the integral of an offset error of `offset_error` (m/s^2) is below `agreement` (-) of the speed
     plus `agreement_speed` (m/s).
@@ -74,9 +74,6 @@ class AccelerometerIntegral(AbstractWheelMethod):
     rates over a time).
     """
 
-    free_rate: jax.Array = positive("m/s^2", default=1.5)
-    free_acceleration: jax.Array = positive("m/s^2", default=2.0)
-    wheel_time: jax.Array = positive("s", default=0.05)
     offset_time: jax.Array = positive("s", default=2.0)
     offset_error: jax.Array = positive("m/s^2", default=0.1)
 
@@ -93,12 +90,7 @@ class AccelerometerIntegral(AbstractWheelMethod):
         felt = own.felt.hear(wheels.t, values["a_x"])
         speaks = felt.speaks(wheels.t)
         rate = jnp.where(speaks, felt.value - own.offset, 0.0)
-        strange = wheels.mean_rate - rate
-        free = self.agree(wheels) & (jnp.abs(strange) < self.free_rate) & (jnp.abs(rate) < self.free_acceleration)
-        v_x = own.v_x + step * rate
-        v_x = jnp.where(free, v_x + (1.0 - jnp.exp(-step / self.wheel_time)) * (wheels.mean - v_x), v_x)
-        learns = free & speaks
-        offset = own.offset - jnp.where(learns, 1.0 - jnp.exp(-step / self.offset_time), 0.0) * strange
+        v_x, free, strange = self.integrate(own.v_x, wheels, step, rate, rate)
+        offset = own.offset - jnp.where(free & speaks, 1.0 - jnp.exp(-step / self.offset_time), 0.0) * strange
         alone = jnp.where(free, 0.0, own.alone + step)
-        known = speaks & (self.offset_error * alone < self.agreement * jnp.abs(v_x) + self.agreement_speed)
-        return Integrated(v_x, offset, felt, alone), v_x, known
+        return Integrated(v_x, offset, felt, alone), v_x, speaks & self.is_small(self.offset_error * alone, v_x)

@@ -12,7 +12,8 @@ from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.speed.accelerometer import Felt, never_felt
-from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, AbstractWheelMethod, Wheels
+from jaxveh.estimators.speed.free_wheels import AbstractFreeWheels
+from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, Wheels
 from jaxveh.vehicles import GRAVITY
 
 
@@ -26,21 +27,16 @@ class Pushed(NamedTuple):
     alone: Any
 
 
-class AbstractForces(AbstractWheelMethod, AbstractDriveForce):
+class AbstractForces(AbstractFreeWheels, AbstractDriveForce):
     """`mass dv_x/dt = sum of the wheels' F_x - drag v_x |v_x|`, corrected by wheels that roll freely.
 
-    Wheels roll freely where they agree and their mean rate is within `free_rate` (m/s^2) of that of the forces and below
-    `free_acceleration` (m/s^2). Then the speed follows their mean with the time constant `wheel_time` (s), and the acceleration
-    that no torque explains (grade, rolling resistance of the road, a wrong mass) is learned with `rest_time` (s). The speed is
-    known as long as the integral of an error of `rate_error` (m/s^2) is below `agreement` (-) of the speed plus
-    `agreement_speed` (m/s).
+    Where they roll freely, the acceleration that no torque explains (grade, rolling resistance of the road, a wrong mass) is
+    learned with `rest_time` (s). The speed is known as long as the integral of an error of `rate_error` (m/s^2) is below
+    `agreement` (-) of the speed plus `agreement_speed` (m/s).
     """
 
     mass: jax.Array = positive("kg", default=1500.0)
     wheel_radius: jax.Array = positive("m", default=0.32)
-    free_rate: jax.Array = positive("m/s^2", default=1.5)
-    free_acceleration: jax.Array = positive("m/s^2", default=2.0)
-    wheel_time: jax.Array = positive("s", default=0.05)
     rest_time: jax.Array = positive("s", default=3.0)
     rate_error: jax.Array = positive("m/s^2", default=0.2)
 
@@ -75,15 +71,10 @@ class AbstractForces(AbstractWheelMethod, AbstractDriveForce):
         force = self.force(wheels, {name: jnp.where(f.speaks(t), f.value, 0.0) for name, f in heard.items()})
         rate = (force - self.drag * own.v_x * jnp.abs(own.v_x)) / self.mass + own.rest
         rate = jnp.where(speaks, rate, 0.0)
-        strange = wheels.mean_rate - rate
-        free = self.agree(wheels) & (jnp.abs(strange) < self.free_rate)
-        free = free & (jnp.abs(wheels.mean_rate) < self.free_acceleration)
-        v_x = own.v_x + step * rate
-        v_x = jnp.where(free, v_x + (1.0 - jnp.exp(-step / self.wheel_time)) * (wheels.mean - v_x), v_x)
+        v_x, free, strange = self.integrate(own.v_x, wheels, step, rate, wheels.mean_rate)
         rest = own.rest + jnp.where(free & speaks, 1.0 - jnp.exp(-step / self.rest_time), 0.0) * strange
         alone = jnp.where(free, 0.0, own.alone + step)
-        known = speaks & (self.rate_error * alone < self.agreement * jnp.abs(v_x) + self.agreement_speed)
-        return Pushed(v_x, rest, heard, alone), v_x, known
+        return Pushed(v_x, rest, heard, alone), v_x, speaks & self.is_small(self.rate_error * alone, v_x)
 
 
 class BrakeForces(AbstractForces):

@@ -86,8 +86,7 @@ class Weighted(AbstractWheelMethod, AbstractOffsetAndSlope):
         found = innovation(belief, lambda x: x[0], mean, variance)
         belief = update(belief, found, 1.0)
         std = _std(belief, 0)
-        known = std < self.agreement * jnp.abs(belief.mean[0]) + self.agreement_speed
-        return Weighed(belief, felt), belief.mean[0], known
+        return Weighed(belief, felt), belief.mean[0], self.is_small(std, belief.mean[0])
 
     def _with_bands(self, own: Weighed, said: Any):
         belief = own.belief

@@ -125,6 +125,10 @@ class AbstractWheelMethod(AbstractMethod):
         """Whether the wheels agree."""
         return wheels.agree(self.agreement, self.agreement_speed)
 
+    def is_small(self, error: Any, v_x: Any) -> Any:
+        """Whether an error of the speed (m/s) is below `agreement` of the speed plus `agreement_speed`."""
+        return error < self.agreement * jnp.abs(v_x) + self.agreement_speed
+
     def first(self, t, values):
         wheels = first_wheels(t, values)
         return self._say(self.begin(wheels, values), wheels, jnp.zeros_like(t), values)
