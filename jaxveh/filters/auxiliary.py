@@ -41,6 +41,31 @@ class FirstStage(NamedTuple):
     resampled: Any
     alive: Any
 
+    def weigh(self, log_n, drawn, plain, oftener, lost) -> SecondStage:
+        """The second stage. `log_n`: the logarithm of the number of particles before the step, which with an adaptive number may
+        differ from that of this step; log weights (N,): `drawn` after a draw of ancestors, `plain` without one (an ordinary
+        importance step from the weights before); `oftener` (N,): by how much more often than by its weight each particle's
+        ancestor was drawn, as a logarithm; which particles are `lost`."""
+        log_first = self.log_mean
+        if self.resampled is not None:
+            drawn = jnp.where(self.resampled, drawn, plain)
+            log_first = jnp.where(self.resampled, log_first, -log_n)
+            oftener = jnp.where(self.resampled, oftener, 0.0)
+        weights, log_second, alive = numerics.normalise(without(lost, drawn))
+        alive = alive & self.alive
+        remark = jnp.where(alive, remark_of(weights, oftener), code(Result.successful))
+        return SecondStage(weights, log_first + log_n + log_second, alive, remark)
+
+
+class SecondStage(NamedTuple):
+    """The normalised `weights` (N,) after a measurement, the step's `log_likelihood`, whether any particle is `alive`, and the
+    `remark` on what the first stage foresaw."""
+
+    weights: Any
+    log_likelihood: Any
+    alive: Any
+    remark: Any
+
 
 class LookedAhead(AbstractAhead):
     """Particles before their second-stage weights: moved from the belief `before`, some of them `lost` (N,).
@@ -58,26 +83,16 @@ class LookedAhead(AbstractAhead):
         before, stage = self.before, self.stage
         logs, after = log_prob(model, row, self.particles)
         chosen_ahead = gather((stage.ahead,), stage.ancestors)[0]
-        # The number of particles before the step: with an adaptive number it may differ from that of this step.
-        n = jnp.asarray(before.weights.shape[0], logs.dtype)
+        log_n = jnp.log(jnp.asarray(before.weights.shape[0], logs.dtype))
         drawn = logs - chosen_ahead + log_chosen(filter_, log_of(stage.weights), stage.ancestors)
-        log_first = stage.log_mean
-        oftener = chosen_ahead - (log_first + jnp.log(n))
-        if stage.resampled is not None:
-            # Without a draw: an ordinary importance step from the weights before.
-            drawn = jnp.where(stage.resampled, drawn, logs + log_of(before.weights) + jnp.log(n))
-            log_first = jnp.where(stage.resampled, log_first, -jnp.log(n))
-            oftener = jnp.where(stage.resampled, oftener, 0.0)
-        weights, log_second, alive = numerics.normalise(without(self.lost, drawn))
-        log_likelihood = log_first + jnp.log(n) + log_second
-        found = ParticleBelief(self.particles, weights, stage.ancestors, before.key, row.t, row.u, before.count + 1)
-        alive = alive & stage.alive
-        within = _scatter(model, after, gather(self.residual, stage.ancestors))
-        remark = jnp.where(alive, remark_of(weights, oftener), code(Result.successful))
-        both = (before.weights, weights)
-        info = make_info(
-            model, row, log_likelihood, self.residual, both, fate(alive, self.lost), within, self.characteristic, remark
+        plain = logs + log_of(before.weights) + log_n
+        weights, total, alive, remark = stage.weigh(
+            log_n, drawn, plain, chosen_ahead - (stage.log_mean + log_n), self.lost
         )
+        found = ParticleBelief(self.particles, weights, stage.ancestors, before.key, row.t, row.u, before.count + 1)
+        within = _scatter(model, after, gather(self.residual, stage.ancestors))
+        both, became = (before.weights, weights), fate(alive, self.lost)
+        info = make_info(model, row, total, self.residual, both, became, within, self.characteristic, remark)
         return found, info
 
 

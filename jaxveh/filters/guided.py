@@ -10,14 +10,12 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_one_of
-from jaxveh._core.result import Result, code
 from jaxveh.filters.auxiliary import FirstStage
 from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, gather, log_chosen, log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, unwrap, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, Points, Slopes, product, times
-from jaxveh.filters.looking_ahead import remark_of
 from jaxveh.filters.particle import (
     SHORTEST,
     AbstractAhead,
@@ -94,23 +92,15 @@ class Proposed(AbstractAhead):
         after, _ = log_prob(model, row, self.particles)
         _, residual = log_prob(model, row, self.moved)
         kept = log_chosen(filter_, log_of(stage.weights), stage.ancestors)
-        n = jnp.log(jnp.asarray(before.weights.shape[0], after.dtype))
-        log_first, chosen_ahead = stage.log_mean, stage.ahead[stage.ancestors]
+        log_n = jnp.log(jnp.asarray(before.weights.shape[0], after.dtype))
+        chosen_ahead = stage.ahead[stage.ancestors]
         drawn = after + self.ratio + kept - (chosen_ahead if filter_.auxiliary else 0.0)
-        oftener = chosen_ahead - (log_first + n) if filter_.auxiliary else jnp.zeros_like(after)
-        if stage.resampled is not None:
-            logs = without(self.lost, log_of(before.weights))
-            drawn = jnp.where(stage.resampled, drawn, after + self.ratio + logs + n)
-            log_first = jnp.where(stage.resampled, log_first, -n)
-            oftener = jnp.where(stage.resampled, oftener, 0.0)
-        weights, log_second, alive = numerics.normalise(without(self.astray, drawn))
+        plain = after + self.ratio + without(self.lost, log_of(before.weights)) + log_n
+        oftener = chosen_ahead - (stage.log_mean + log_n) if filter_.auxiliary else jnp.zeros_like(after)
+        weights, total, alive, remark = stage.weigh(log_n, drawn, plain, oftener, self.astray)
         found = ParticleBelief(self.particles, weights, stage.ancestors, before.key, row.t, row.u, before.count + 1)
-        alive = alive & stage.alive
-        became = fate(alive, self.lost)
-        remark = jnp.where(alive, remark_of(weights, oftener), code(Result.successful))
         within = mean_variances(model, before.weights, self.variances)
-        total = log_first + n + log_second
-        about = (before.weights, weights)
+        about, became = (before.weights, weights), fate(alive, self.lost)
         info = make_info(model, row, total, residual, about, became, within, self.moved, remark)
         return found, info
 
