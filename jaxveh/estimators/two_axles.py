@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import KW_ONLY
 from typing import Any
 
 import equinox as eqx
@@ -25,6 +26,7 @@ LONGEST = 0.3
 class AbstractTwoAxles(eqx.Module):
     """A car of `mass` (kg), whose axles are `front_axle_to_cg` and `rear_axle_to_cg` (m) away from the centre of gravity."""
 
+    _: KW_ONLY
     mass: jax.Array = positive("kg")
     front_axle_to_cg: jax.Array = positive("m")
     rear_axle_to_cg: jax.Array = positive("m")
@@ -41,6 +43,7 @@ class AbstractTwoAxles(eqx.Module):
 class AbstractLinearAxles(AbstractTwoAxles):
     """A car whose axles have the cornering stiffnesses `front_cornering_stiffness` and `rear_cornering_stiffness` (N/rad)."""
 
+    _: KW_ONLY
     front_cornering_stiffness: jax.Array = positive("N/rad")
     rear_cornering_stiffness: jax.Array = positive("N/rad")
 
@@ -53,6 +56,7 @@ def linear_axles_of(car: CarSpecification) -> dict[str, float]:
 class AbstractAxleForces(AbstractTwoAxles):
     """A car whose `yaw_inertia` (kg m^2) gives the forces of both axles."""
 
+    _: KW_ONLY
     yaw_inertia: jax.Array = positive("kg m^2")
 
     def axle_forces(self, a_y: Any, yaw_acceleration: Any) -> tuple[Any, Any]:
