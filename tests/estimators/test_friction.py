@@ -115,6 +115,41 @@ def test_near_the_limit_lateral_methods_find_the_friction_and_in_the_linear_rang
     assert not np.asarray(gentle.known.friction).any()
 
 
+def test_below_the_limit_no_friction_is_known_that_depends_on_the_curve_and_at_it_both_curves_know_it():
+    """On roads of the file's curve and of the brush model's, up to 0.8 of the limit and at it."""
+    levels = (0.07, 0.08, 0.1, 0.13)
+    drives = [
+        lateral_drive(mu, active(level * mu), forces)
+        for mu in (0.5, 0.8)
+        for forces in (similar_axles, brush_axles)
+        for level in levels
+    ]
+    truths = np.repeat([0.5, 0.8], 2 * len(levels))[:, None]
+    method = friction.METHODS["bank"].make(CAR)
+    said, file_alone = (
+        follow_all(lambda made, by=by: made if by else made.inner, [(method, drive) for drive in drives], T)
+        for by in (True, False)
+    )
+    late = T > 6.0
+    error = lambda said: np.abs(said.mean.friction / truths - 1.0)[:, late]
+    known = lambda said: np.asarray(said.known.friction)[:, late]
+    assert not (known(said) & (error(said) > 0.1)).any()
+    assert (known(said)[len(levels) - 1 :: len(levels)].mean(axis=1) > 0.3).all()
+    # The file's curve alone is sure of others.
+    assert np.mean((known(file_alone) & (error(file_alone) > 0.1))[len(levels) :][: len(levels)]) > 0.1
+
+
+def test_a_friction_beyond_those_of_the_bank_is_not_known():
+    bank = friction.METHODS["bank"].make(CAR).inner
+    fewer = bank.frictions[bank.frictions < 0.55]
+    drive = lateral_drive(0.6, active(0.13 * 0.6))
+    few = dataclasses.replace(bank, frictions=fewer, prior=fewer)
+    answers = [follow_all(lambda made: made, [(made, drive)], T) for made in (bank, few)]
+    late = T > 6.0
+    assert np.mean(answers[0].known.friction[0, late]) > 0.3
+    assert not np.asarray(answers[1].known.friction[0, late]).any()
+
+
 def test_a_jump_is_followed_within_a_second_where_there_is_excitation():
     mu = np.where(T < 8.0, 0.9, 0.35)
     said = estimated("bank", lateral_drive(mu, active(0.07)))
@@ -133,7 +168,7 @@ def test_a_steer_that_is_off_makes_no_friction_known_on_a_dry_road():
     said = estimated("bank", drive)
     assert not np.asarray(said.known.friction).any()
     # The filter without the offset as a state is misled.
-    method = dataclasses.replace(friction.METHODS["bank"].make(CAR), offset_spread=jnp.asarray(1e-6))
+    method = dataclasses.replace(friction.METHODS["bank"].make(CAR).inner, offset_spread=jnp.asarray(1e-6))
     units = {need.channel: need.unit for need in method.needs if need.channel in drive}
     misled = friction.estimate(method, Recording(T, {n: drive[n] for n in units}, units))
     assert np.min(misled["friction"]) < 0.5 < 0.68 < np.min(said["friction"])
@@ -144,7 +179,7 @@ def test_a_friction_that_could_not_carry_the_acceleration_is_not_possible(along)
     """Straight ahead with 5 m/s^2, and in a bend that the steer does not explain."""
     drive = lateral_drive(1.0, 0.0 * T)
     drive = drive | ({"a_x": np.full(T.shape, 5.0)} if along else {"a_y": np.full(T.shape, 5.0)})
-    method = friction.METHODS["bank"].make(CAR)
+    method = friction.METHODS["bank"].make(CAR).inner
     row = lambda k: {n.channel: jnp.asarray(drive.get(n.channel, T * np.nan)[k]) for n in method.needs}
     memory, _ = method.first(jnp.asarray(0.0), row(0))
     low, step = np.asarray(method.frictions) < 0.3, eqx.filter_jit(lambda *given: method.next(*given))
@@ -300,7 +335,7 @@ def test_the_slip_slope_is_a_stiffness_and_becomes_friction_by_its_calibration_a
 
 def test_a_file_without_wheels_has_lateral_methods_alone():
     bare = dataclasses.replace(CAR, wheel_radius=None)
-    assert friction.METHODS["bank"].make(bare).along is None
+    assert friction.METHODS["bank"].make(bare).inner.along is None
     with pytest.raises(InputError, match="no wheel_radius"):
         friction.METHODS["sides_apart"].make(bare)
     with pytest.raises(InputError, match="no steering_ratio"):

@@ -94,6 +94,17 @@ class TestTransport:
         np.testing.assert_allclose(np.mean(found.x), np.sum(weights * particles.x), atol=1e-4)
         np.testing.assert_allclose(found.y, 7.0, rtol=1e-12)
 
+    @pytest.mark.parametrize("unit", [1e-12, 1e12])
+    def test_units_do_not_matter(self, unit):
+        rng = np.random.default_rng(4)
+        particles, weights = record_type("P", ("x", "y"))(*rng.normal(size=(2, 30))), rng.dirichlet(np.ones(30))
+        transport = filters.Transport(0.2, 300)
+        plain, converged = moved(transport, particles, weights)
+        scaled, also = moved(transport, particles._replace(y=unit * particles.y), weights)
+        assert converged and also
+        np.testing.assert_allclose(scaled.x, plain.x, rtol=1e-9)
+        np.testing.assert_allclose(scaled.y / unit, plain.y, rtol=1e-9)
+
     def test_its_bias_falls_with_the_smoothing(self):
         model, total, bias = linear(n=3), exact(n=3)["log_likelihood"].sum(), {}
         for epsilon in (2.0, 0.1):

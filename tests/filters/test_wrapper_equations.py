@@ -135,6 +135,37 @@ def test_haar_noise():
         check(belief, m, P)
 
 
+@pytest.mark.parametrize("start", [None, [0.8, 0.2]])
+def test_interacting_models(start):
+    """Blom & Bar-Shalom 1988: mix by the transition, update each mode, weigh; the likelihood is that of the mixture."""
+    noises, transition = (R0, 9.0 * R0), np.array([[0.9, 0.1], [0.3, 0.7]])
+    noisy = lambda m: eqx.tree_at(lambda m: m.measurement_noise.std.flow, m, jnp.asarray(noises[1] ** 0.5))
+    filter_ = filters.InteractingModels(filters.Kalman(), (lambda m: m, noisy), transition, start)
+    base = model(R0**0.5, Q**0.5)
+    recording = Recording(np.arange(float(len(FLOW))), {"flow": FLOW})
+    found = filters.run(filter_, base, recording)
+    weights, ms, Ps = np.array([0.5, 0.5] if start is None else start), np.zeros(2), np.ones(2)
+    for k, y in enumerate(FLOW):
+        if k > 0:
+            joint = transition * weights[:, None]
+            weights = joint.sum(axis=0)
+            share = joint / weights
+            mixed = share.T @ ms
+            Ps = np.array([share[:, j] @ (Ps + (ms - mixed[j]) ** 2) for j in range(2)]) + Q
+            ms = mixed
+        log_likelihood = 0.0
+        if np.isfinite(y):
+            S = Ps + np.array(noises)
+            densities = weights * np.exp(-0.5 * (y - ms) ** 2 / S) / np.sqrt(2.0 * np.pi * S)
+            ms, Ps = ms + Ps / S * (y - ms), Ps - Ps**2 / S
+            log_likelihood, weights = np.log(densities.sum()), densities / densities.sum()
+        mean = weights @ ms
+        std = np.sqrt(weights @ (Ps + (ms - mean) ** 2))
+        row = (found.mean.level[k], found.std.level[k], found.info.log_likelihood[k])
+        np.testing.assert_allclose(row, (mean, std, log_likelihood), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.belief.probabilities, weights, rtol=1e-9)
+
+
 def test_h_infinity_with_a_scale():
     """P~ = (P^-1 - bound S)^-1 with S = 1 / scale^2 of a state that is named, zero of one that is not."""
     bound, scale = 0.4, 2.0

@@ -290,3 +290,30 @@ def test_the_loaded_radius_of_62_carries_the_load_and_has_its_derivatives():
     _, slopes = radius(point)
     np.testing.assert_allclose(slopes, numeric, rtol=2e-3)
     assert float(slopes[0]) < 0
+
+
+def test_the_contact_patch_is_its_equation_and_ends_where_the_rim_would_touch_the_road():
+    """A9, A10 of MF-Tyre 6.1 (I. Besselink, A. Schmeitz & H. Pacejka 2010): a grows with share and its root, b with its cube
+    root."""
+    structure = version_62().structure
+    r, stiffness = float(structure.UNLOADED_RADIUS), float(structure.vertical_stiffness(0.1))
+    lowest = r - float(structure.RIM_RADIUS) - float(structure.BOTTOM_OFFST)
+    for load in (0.0, 1500.0, 4000.0, 2.0 * lowest * stiffness):
+        share = min(load, lowest * stiffness) / (stiffness * r)
+        a = r * (float(structure.Q_RA2) * share + float(structure.Q_RA1) * share**0.5)
+        b = float(structure.WIDTH) * (float(structure.Q_RB2) * share + float(structure.Q_RB1) * share ** (1 / 3))
+        np.testing.assert_allclose(structure.contact_patch(load, 0.1, 61), (a, b), rtol=1e-12, atol=1e-15)
+
+
+def test_below_vxlow_shifts_fade_smoothly_and_slips_alone_where_the_car_gives_no_slip_speed():
+    """A car that gives the slip speed has its own way of a wheel that hardly turns."""
+    tyre = tyre_of("tumftm__pa_sim_tireparameters.tir")
+    tyre = eqx.tree_at(lambda t: (t.ranges.VXLOW, t.lateral.PVY1), tyre, (jnp.asarray(2.0), jnp.asarray(0.05)))
+    at = lambda angle, **given: float(tyre.forces(Contact(slip_angle=angle, load=3000.0, **given)).F_y)
+    shift = lambda **given: 0.5 * (at(1e-9, **given) + at(-1e-9, **given))
+    # A third of VXLOW: 0.5 (1 - cos(pi / 3)) = 1 / 4.
+    for given in ({"slip_speed": 1.0}, {}):
+        np.testing.assert_allclose(shift(speed=2.0 / 3.0, **given) / shift(speed=20.0, **given), 0.25, rtol=0.02)
+    slope = lambda **given: at(1e-4, **given) - at(-1e-4, **given)
+    np.testing.assert_allclose(slope(speed=2.0 / 3.0, slip_speed=1.0) / slope(speed=20.0), 1.0, rtol=0.05)
+    np.testing.assert_allclose(slope(speed=2.0 / 3.0) / slope(speed=20.0), 1.0 / 3.0, rtol=0.05)

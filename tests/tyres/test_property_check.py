@@ -182,6 +182,34 @@ def test_each_finding(old, new, expected):
     assert any(line.startswith(expected) for line in found(GOOD.replace(old, new, 1))), found(GOOD.replace(old, new, 1))
 
 
+STIFF = "VERTICAL_STIFFNESS = 200000"
+
+
+@pytest.mark.parametrize(
+    ("old", "within", "beyond", "says"),
+    [
+        ("PDX1 = 1.1", "PDX1 = 2.95", "PDX1 = 3.05", "longitudinal friction"),
+        ("PDX1 = 1.1", "PDX1 = 0.36", "PDX1 = 0.19", "longitudinal friction"),
+        ("PDY1 = 1.0", "PDY1 = 2.95", "PDY1 = 3.05", "lateral friction"),
+        ("PKX1 = 20", "PKX1 = 79", "PKX1 = 81", "slip stiffness over load"),
+        ("PKX1 = 20", "PKX1 = 5.1", "PKX1 = 4.9", "slip stiffness over load"),
+        ("PKY1 = -20", "PKY1 = -73", "PKY1 = -77", "cornering stiffness over load"),
+        ("PKY1 = -20", "PKY1 = -3.9", "PKY1 = -3.6", "cornering stiffness over load"),
+        ("QCZ1 = 1.1", "QCZ1 = 0.1", "QCZ1 = 0", "QCZ1 is 0"),
+        (STIFF, "VERTICAL_STIFFNESS = 65000", "VERTICAL_STIFFNESS = 62000", "deflection over radius"),
+        (STIFF, "VERTICAL_STIFFNESS = 1250000", "VERTICAL_STIFFNESS = 1300000", "deflection over radius"),
+        ("QDZ1 = 0.1", "QDZ1 = 0.29", "QDZ1 = 0.31", "pneumatic trail over radius"),
+        ("QDZ1 = 0.1", "QDZ1 = 0\nQDZ2 = 0\nQCZ1 = 0", "QDZ1 = 0.01\nQDZ2 = 0\nQCZ1 = 0", "QCZ1 is 0"),
+        ("QDZ1 = 0.1", "QDZ1 = 0\nQDZ2 = 0\nQCZ1 = 0", "QDZ1 = 0\nQDZ2 = 0.01\nQCZ1 = 0", "QCZ1 is 0"),
+    ],
+)
+def test_a_finding_begins_at_its_limit(old, within, beyond, says):
+    assert old in GOOD
+    good = GOOD.replace("QCZ1 = 1.1\n", "") if "QCZ1" in within else GOOD
+    told = lambda new: [line for line in found(good.replace(old, new, 1)) if line.startswith(says)]
+    assert not told(within) and told(beyond)
+
+
 def test_the_nominal_load_is_the_scaled_one():
     scaled = GOOD.replace("LMUX = 1", "LMUX = 1\nLFZO = 0.4")
     remark, *others = found(scaled)

@@ -14,6 +14,7 @@ from jaxveh.estimators.friction.along import AlongEvidence, WheelForces
 from jaxveh.estimators.friction.augmented import augmented_filter
 from jaxveh.estimators.friction.axles import AligningTorque, Axles, HybridObserver, LateralCurve
 from jaxveh.estimators.friction.bank import FrictionBank
+from jaxveh.estimators.friction.curve_doubt import CurveDoubt
 from jaxveh.estimators.friction.curve_follower import CurveFollower
 from jaxveh.estimators.friction.laws import planar_car
 from jaxveh.estimators.friction.scalar import Follower
@@ -29,8 +30,9 @@ NAME = "friction"
 
 SHOWN = {"friction": "-"}
 
-COUNT, LEAST, MOST = 28, 0.1, 1.25
-"""Number of filters of the recommended method, from the least to the largest friction in equal logarithmic steps."""
+COUNT, LEAST, MOST = 36, 0.06, 1.65
+"""Number of filters of the recommended method, from the least to the largest friction in equal logarithmic steps. Frictions of
+0.07 to 1.37 can be known."""
 
 
 def _wheels(car: CarSpecification, who: str) -> WheelForces:
@@ -42,12 +44,12 @@ def _slips(car: CarSpecification, who: str) -> WheelSlips:
     return WheelSlips(planar_car(car), _wheels(car, who))
 
 
-def _bank(car: CarSpecification) -> FrictionBank:
+def _bank(car: CarSpecification) -> CurveDoubt:
     planar = planar_car(car)
     frictions = jnp.exp(jnp.linspace(jnp.log(LEAST), jnp.log(MOST), COUNT))
     wheels = None if car.wheel_radius is None or car.wheel_inertia is None else _wheels(car, "bank")
     along = None if wheels is None else AlongEvidence(planar, wheels)
-    return FrictionBank(planar, frictions, frictions, along=along)
+    return CurveDoubt(FrictionBank(planar, frictions, frictions, along=along))
 
 
 def _lateral(car: CarSpecification) -> LateralCurve:
@@ -75,7 +77,8 @@ def _lugre(car: CarSpecification) -> WheelObserver:
 METHODS = {
     "bank": MethodOfCar(
         _bank,
-        "one filter of the lateral motion per friction, with wheel slips where the log has them; known only near the limit",
+        "one filter of the lateral motion per friction, with wheel slips where the log has them; known only near the limit, and "
+        "where the file's curve and the brush model's agree",
         "section 3.1.2.1, joint with reference [99]; interacting multiple models (Blom & Bar-Shalom 1988)",
     ),
     "lateral_curve": MethodOfCar(

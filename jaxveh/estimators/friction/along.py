@@ -125,6 +125,7 @@ class AlongEvidence(eqx.Module):
     car: PlanarCar
     wheels: WheelForces
     stiffness_ratio: jax.Array = positive("-", default=1.0)
+    shape: jax.Array = positive("-", default=1.65)
     force_noise: jax.Array = positive("-", default=0.05)
     load_noise: jax.Array = positive("-", default=0.015)
     slip_noise: jax.Array = positive("-", default=0.003)
@@ -189,8 +190,7 @@ class AlongEvidence(eqx.Module):
         nominal = 0.5 * curve.peak
         limit = jnp.maximum(friction, LEAST_FRICTION) * nominal * seen.load
         left = numerics.sqrt(jnp.maximum(1.0 - jnp.square(0.5 * across * seen.load / limit), 0.1))
-        wheel = SimilarCurve(0.5 * self.stiffness_ratio * curve.stiffness, nominal, curve.shape, curve.bend)
-        force, slope = wheel.with_slope(seen.slip, friction * left, seen.load)
+        force, slope = curve.along(self.stiffness_ratio, self.shape).with_slope(seen.slip, friction * left, seen.load)
         beyond = 0.1 * limit * jnp.square(seen.slip) / (jnp.square(seen.slip) + 0.04)
         rough = jnp.square(self.force_noise * seen.force) + jnp.square(self.load_noise * nominal * seen.load)
         rough = rough + jnp.square(beyond) + jnp.square(0.15 * force)

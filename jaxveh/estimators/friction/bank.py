@@ -64,8 +64,8 @@ class FrictionBank(AbstractMethod):
     (`AlongEvidence`). A friction that could not have carried the measured acceleration is not possible.
 
     The answer is the median and the standard deviation about it. `known`: the probability that the friction is within 20 % of the
-    median is at least `certainty`. The estimate is the road's friction over that on which the car's tyre parameters hold, one
-    value for all wheels.
+    median is at least `certainty`, and all of these frictions are within those of the bank. The estimate is the road's friction
+    over that on which the car's tyre parameters hold, one value for all wheels.
 
     `frictions` (K,) of the filters and `prior` (K,), their probabilities without information; `jumps` (1/s): rate of jumps to any
     friction; `walk` (1/sqrt(s)): random walk of ln mu; `turn_time`, `force_time` (s): innovations of yaw rate and of a_y closer
@@ -251,7 +251,9 @@ class FrictionBank(AbstractMethod):
         within = jnp.square(spacing * self.frictions) / 12.0
         std = numerics.sqrt(jnp.sum(weights * (jnp.square(self.frictions - median) + within)))
         near = jnp.sum(jnp.where(jnp.abs(logs - jnp.log(median)) < NEAR, weights, 0.0))
-        known = told.moves & (near >= self.certainty)
+        # The forces may speak for a friction outside the bank, whose probability gathers at its ends.
+        inside = (jnp.abs(jnp.log(median) - 0.5 * (logs[0] + logs[-1])) + NEAR) < 0.5 * (logs[-1] - logs[0])
+        known = told.moves & inside & (near >= self.certainty)
         return answer({"friction": median}, {"friction": std}, known)
 
 

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.friction import brush_curve
 from jaxveh.estimators.two_axles import AbstractAxleForces
 from jaxveh.io import CarSpecification
 from jaxveh.tyres import kit as tyres
@@ -27,19 +28,31 @@ class SimilarCurve(eqx.Module):
 
     `stiffness` K (N/rad, longitudinally N) at the static load, independent of friction; `peak` D (N) at the static load on the
     road on which the file's parameters hold; `shape` C, `bend` E (-). f is load over static load, k a factor on the stiffness.
+    `brush` (-, 0 to 1): the share of the brush model's curve of the same stiffness and peak, which saturates later.
     """
 
     stiffness: jax.Array = positive("N/rad")
     peak: jax.Array = positive("N")
     shape: jax.Array = positive("-")
     bend: jax.Array = parameter("-", scale=2.0)
+    brush: jax.Array = parameter("-", scale=1.0, default=0.0)
+
+    def of_a_wheel(self, ratio=1.0) -> SimilarCurve:
+        """The curve of one of the axle's two wheels, with `ratio` times its stiffness."""
+        return SimilarCurve(0.5 * ratio * self.stiffness, 0.5 * self.peak, self.shape, self.bend, self.brush)
+
+    def along(self, ratio, shape) -> SimilarCurve:
+        """The longitudinal curve of one of the axle's two wheels: `ratio` times the stiffness, another `shape` C, no bend."""
+        return SimilarCurve(0.5 * ratio * self.stiffness, 0.5 * self.peak, shape, jnp.zeros_like(self.bend), self.brush)
 
     def force(self, slip, friction, load=1.0, factor=1.0):
         """Force (N) of the axle at a slip (rad, or -), `load` over the static one, `factor` on the stiffness."""
         friction = jnp.maximum(friction, LEAST_FRICTION)
         x = self.stiffness * factor / (self.shape * self.peak) * slip / friction
         bent = x - self.bend * (x - numerics.arctan(x))
-        return friction * load * self.peak * numerics.sin(self.shape * numerics.arctan(bent))
+        magic = friction * load * self.peak * numerics.sin(self.shape * numerics.arctan(bent))
+        later = brush_curve.force(slip, self.stiffness * factor * load, friction * load * self.peak)
+        return magic + self.brush * (later - magic)
 
     def with_slope(self, slip, friction, load=1.0, factor=1.0):
         """The force (N) and its slope over the slip (N/rad)."""
@@ -106,7 +119,7 @@ def planar_car(car: CarSpecification) -> PlanarCar:
 
 def along_curve(curve: SimilarCurve, ratio: float = 1.2) -> SimilarCurve:
     """The longitudinal curve of an axle from its lateral one: equal friction and shape, `ratio` times the stiffness."""
-    return SimilarCurve(ratio * curve.stiffness, curve.peak, curve.shape, curve.bend)
+    return SimilarCurve(ratio * curve.stiffness, curve.peak, curve.shape, curve.bend, curve.brush)
 
 
 def _curve(tyre, stiffness: float, load: float) -> SimilarCurve:

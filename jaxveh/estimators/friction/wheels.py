@@ -65,7 +65,7 @@ class WheelSlips(eqx.Module):
     def curves(self, ratio) -> tuple[SimilarCurve, ...]:
         """The longitudinal curve of each wheel: half of its axle's, with `ratio` times the stiffness."""
         axles = (self.car.front, self.car.front, self.car.rear, self.car.rear)
-        return tuple(SimilarCurve(0.5 * ratio * c.stiffness, 0.5 * c.peak, c.shape, c.bend) for c in axles)
+        return tuple(curve.of_a_wheel(ratio) for curve in axles)
 
     def _straight(self, t, values):
         """The values with zero for the lateral sensors, which count as measured because nothing here depends on them."""
