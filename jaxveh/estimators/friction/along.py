@@ -117,9 +117,10 @@ class AlongEvidence(eqx.Module):
 
     A radius is known to a share of `radius_noise` (-): the slip of a wheel at small force is learned as an offset and subtracted.
     A force's error is a share `force_noise` (-) of it and `load_noise` (-) of the load. A slip's error is `slip_noise` (-) and
-    the error of the offset; it lasts for `slip_time` (s), so that many rows give hardly more information than one. The curve's
-    uncertainty grows with the slip. Slips below `knee` (-) hardly count: they depend on stiffness, not on friction. Rows closer
-    than `correlation` (s) count as one.
+    the error of the offset; it lasts for `slip_time` (s), so that many rows give hardly more information than one. The curve has
+    the lateral one's peak, `stiffness_ratio` (-) times its stiffness, and the longitudinal `shape` C (-), by which it falls
+    beyond the peak; its uncertainty grows with the slip. Slips below `knee` (-) hardly count: they depend on stiffness, not on
+    friction. Rows closer than `correlation` (s) count as one.
     """
 
     car: PlanarCar
