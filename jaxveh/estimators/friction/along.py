@@ -13,6 +13,7 @@ from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction.laws import LEAST_FRICTION, PlanarCar, SimilarCurve
 from jaxveh.estimators.two_axles import LONGEST, LOWEST
+from jaxveh.tyres import kit as tyres
 
 CORNERS = ("fl", "fr", "rl", "rr")
 
@@ -126,7 +127,7 @@ class AlongEvidence(eqx.Module):
     car: PlanarCar
     wheels: WheelForces
     stiffness_ratio: jax.Array = positive("-", default=1.0)
-    shape: jax.Array = positive("-", default=1.65)
+    shape: jax.Array = positive("-", default=tyres.TYPICAL_COEFFICIENTS["PCX1"])
     force_noise: jax.Array = positive("-", default=0.05)
     load_noise: jax.Array = positive("-", default=0.015)
     slip_noise: jax.Array = positive("-", default=0.003)

@@ -1,8 +1,8 @@
 """The mass of a car: refs [8], [11], [12], [13] of paper 004, and section 3.1.2.4 of the review (Chen, Gao, Xu 2013).
 
 The mass follows from force over acceleration. Its accuracy is that of the torque at the wheels and of the wheels' radius, and it
-is only observable where pedals move. `known` says whether the standard deviation is within 4 per cent; without new information
-the mean stays.
+is only observable where pedals move. `known` says whether the standard deviation is within 5 per cent, of which 3 are for errors
+of the torques and the wheel radius (not in `joint` and `forgetting`); without new information the mean stays.
 """
 
 from __future__ import annotations

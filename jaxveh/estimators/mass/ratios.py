@@ -15,7 +15,7 @@ from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import answer
-from jaxveh.estimators.pulling import JOINT, SLOWEST, WIDEST_MASS
+from jaxveh.estimators.pulling import JOINT, OF_THE_CAR, SLOWEST, WIDEST_MASS
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -104,10 +104,6 @@ class AbstractRatio(AbstractMotionMethod):
 
 RESIDUAL = 0.05
 """m/s^2: least standard deviation of the residual, force over mass less acceleration."""
-
-
-OF_THE_CAR = 0.025
-"""Relative standard deviation of the mass by errors of the wheel radius in the car's file, or of the torques."""
 
 
 def beyond(rate: Any, gate: Any) -> Any:
