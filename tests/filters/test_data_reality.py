@@ -83,6 +83,16 @@ class TestDelayed:
         with pytest.raises(FilterError, match="older than the rows that are kept"):
             filters.run(filter_, MODEL, Recording(0.2 * time, dict(arriving.channels)))
 
+    def test_a_channel_without_a_new_value_has_no_innovation(self):
+        """In the row of a late value, rows that were already told are filtered anew."""
+        time = np.arange(8) * 0.1
+        y0, y1 = np.sin(time), np.cos(time)
+        y0[5], y1[6] = np.nan, np.nan
+        log = Recording(time, {"y0": y0, "y1": y1, "force": np.full(8, 0.7)})
+        info = filters.run(filters.Delayed(filters.Kalman(), {"y1": 0.15}, depth=6), MODEL, log).info
+        for shown, told in ((info.innovation.y0, y0), (info.innovation_std.y0, y0), (info.innovation.y1, y1)):
+            np.testing.assert_array_equal(np.isfinite(shown[2:]), np.isfinite(told[2:]))
+
     def test_gradients_are_finite_where_a_delayed_value_is_from_before_the_first_row(self):
         """It is left out, and with it a step back in time that nobody takes."""
         time = np.arange(6) * 0.1

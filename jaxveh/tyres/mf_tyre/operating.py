@@ -32,6 +32,6 @@ class Operating(NamedTuple):
     mu_x: Any
     mu_y: Any
     smooth: Any
-    direction: Any = 1.0
+    direction: Any
     spin: Spin = NO_SPIN
     bounded: bool = True
