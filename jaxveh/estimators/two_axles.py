@@ -8,6 +8,7 @@ from typing import Any
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 
 from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.estimators.contract import Need
@@ -66,3 +67,13 @@ class AbstractAxleForces(AbstractTwoAxles):
         lateral = self.mass * a_y
         front = (turn + self.rear_axle_to_cg * lateral) / self.wheelbase
         return front, (self.front_axle_to_cg * lateral - turn) / self.wheelbase
+
+
+def slip_stiffness(cornering: Any, load: Any) -> Any:
+    """Slip stiffness of a tyre over its load (-) from the cornering stiffness of its axle (N/rad) and its load (N).
+
+    A tyre's longitudinal stiffness is about its lateral one, and larger than that of an axle with a compliant steering. It is
+    limited to 12 to 25 loads, where most car tyres lie (H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed., sec. 4.3.1 and
+    appendix 3).
+    """
+    return jnp.clip(0.5 * cornering / load, 12.0, 25.0)

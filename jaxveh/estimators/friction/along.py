@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction.laws import LEAST_FRICTION, PlanarCar, SimilarCurve
-from jaxveh.estimators.two_axles import LONGEST, LOWEST
+from jaxveh.estimators.two_axles import LONGEST, LOWEST, slip_stiffness
 from jaxveh.tyres import kit as tyres
 
 CORNERS = ("fl", "fr", "rl", "rr")
@@ -119,9 +119,9 @@ class AlongEvidence(eqx.Module):
     A radius is known to a share of `radius_noise` (-): the slip of a wheel at small force is learned as an offset and subtracted.
     A force's error is a share `force_noise` (-) of it and `load_noise` (-) of the load. A slip's error is `slip_noise` (-) and
     the error of the offset; it lasts for `slip_time` (s), so that many rows give hardly more information than one. The curve has
-    the lateral one's peak, `stiffness_ratio` (-) times its stiffness, and the longitudinal `shape` C (-), by which it falls
-    beyond the peak; its uncertainty grows with the slip. Slips below `knee` (-) hardly count: they depend on stiffness, not on
-    friction. Rows closer than `correlation` (s) count as one.
+    the lateral one's peak, `stiffness_ratio` (-) times the usual stiffness (`slip_stiffness`), and the longitudinal `shape` C
+    (-), by which it falls beyond the peak; its uncertainty grows with the slip. Slips below `knee` (-) hardly count: they depend
+    on stiffness, not on friction. Rows closer than `correlation` (s) count as one.
     """
 
     car: PlanarCar
@@ -149,8 +149,8 @@ class AlongEvidence(eqx.Module):
     def _learn(self, memory: AlongMemory, seen: Slips, stiffness, dt):
         """The slips' offsets and variances after a row. They are learned from wheels whose force is less than a tenth of the
         linear force at a slip of 0.05."""
-        rolls = seen.there & (jnp.abs(seen.force) < 0.1 * self.stiffness_ratio * stiffness * 0.05)
-        shown = jnp.where(rolls, seen.slip - seen.force / (self.stiffness_ratio * stiffness * seen.load), 0.0)
+        rolls = seen.there & (jnp.abs(seen.force) < 0.1 * stiffness * 0.05)
+        shown = jnp.where(rolls, seen.slip - seen.force / (stiffness * seen.load), 0.0)
         variance = jnp.minimum(
             memory.variance + dt * jnp.square(self.slip_noise) / 100.0, jnp.square(self.radius_noise)
         )
@@ -167,15 +167,13 @@ class AlongEvidence(eqx.Module):
         held = lambda name, last: jnp.where(jnp.isnan(values[name]), last, values[name])
         yaw_rate, a_y = held("yaw_rate", memory.yaw_rate), held("a_y", memory.a_y)
         seen = self.wheels.slips(self.car, wheels, told, yaw_rate, a_y)
-        stiffness = 0.5 * jnp.stack(
-            [c.stiffness for c in (self.car.front, self.car.front, self.car.rear, self.car.rear)]
-        )
-        offset, variance = self._learn(memory, seen, stiffness, dt)
+        curves = self._curves()
+        offset, variance = self._learn(memory, seen, jnp.stack([curve.stiffness for curve in curves]), dt)
         seen = seen._replace(slip=seen.slip - offset)
         lateral = self.car.axle_forces(a_y, jnp.zeros_like(a_y))
         total = jnp.zeros_like(frictions)
         for k in range(4):
-            curve, across = (self.car.front, lateral[0]) if k < 2 else (self.car.rear, lateral[1])
+            curve, across = curves[k], lateral[k // 2]
             one = jax.tree.map(lambda leaf, k=k: leaf[k], seen)
             # The two wheels of an axle share most of their errors.
             of = lambda mu, c=curve, f=across, s=one, p=variance[k]: self._of_wheel(c, f, s, p, mu)
@@ -183,16 +181,23 @@ class AlongEvidence(eqx.Module):
             # One variance for all frictions, as for the motion.
             counts = one.slip**4 / (one.slip**4 + self.knee**4)
             # A wheel that slides laterally gives little longitudinal information.
-            limit = jnp.sum(weights * frictions) * curve.peak
+            limit = 2.0 * jnp.sum(weights * frictions) * curve.peak
             counts = counts * jnp.square(jnp.maximum(1.0 - jnp.square(across / limit), 0.0))
             total = total - 0.25 * counts * jnp.square(error) / jnp.sum(weights * rough)
         return AlongMemory(wheels, offset, variance, yaw_rate, a_y), jnp.minimum(dt / self.correlation, 1.0) * total
 
+    def _curves(self) -> list[SimilarCurve]:
+        """The longitudinal curve of each wheel."""
+        axles = (self.car.front, self.car.front, self.car.rear, self.car.rear)
+        loads = [0.5 * load for load in self.car.static_loads() for _ in range(2)]
+        stiffness = lambda axle, load: self.stiffness_ratio * slip_stiffness(axle.stiffness, load) * load
+        return [axle.along(stiffness(axle, load), self.shape) for axle, load in zip(axles, loads, strict=True)]
+
     def _of_wheel(self, curve: SimilarCurve, across, seen: Slips, variance, friction):
-        nominal = 0.5 * curve.peak
+        nominal = curve.peak
         limit = jnp.maximum(friction, LEAST_FRICTION) * nominal * seen.load
         left = numerics.sqrt(jnp.maximum(1.0 - jnp.square(0.5 * across * seen.load / limit), 0.1))
-        force, slope = curve.along(self.stiffness_ratio, self.shape).with_slope(seen.slip, friction * left, seen.load)
+        force, slope = curve.with_slope(seen.slip, friction * left, seen.load)
         beyond = 0.1 * limit * jnp.square(seen.slip) / (jnp.square(seen.slip) + 0.04)
         rough = jnp.square(self.force_noise * seen.force) + jnp.square(self.load_noise * nominal * seen.load)
         rough = rough + jnp.square(beyond) + jnp.square(0.15 * force)

@@ -41,9 +41,9 @@ class SimilarCurve(eqx.Module):
         """The curve of one of the axle's two wheels, with `ratio` times its stiffness."""
         return SimilarCurve(0.5 * ratio * self.stiffness, 0.5 * self.peak, self.shape, self.bend, self.brush)
 
-    def along(self, ratio, shape) -> SimilarCurve:
-        """The longitudinal curve of one of the axle's two wheels: `ratio` times the stiffness, another `shape` C, no bend."""
-        return SimilarCurve(0.5 * ratio * self.stiffness, 0.5 * self.peak, shape, jnp.zeros_like(self.bend), self.brush)
+    def along(self, stiffness, shape) -> SimilarCurve:
+        """The longitudinal curve of one of the axle's two wheels, with its own stiffness and shape C, and no bend."""
+        return SimilarCurve(stiffness, 0.5 * self.peak, shape, jnp.zeros_like(self.bend), self.brush)
 
     def force(self, slip, friction, load=1.0, factor=1.0):
         """Force (N) of the axle at a slip (rad, or -), `load` over the static one, `factor` on the stiffness."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.two_axles import AbstractLinearAxles, linear_axles_of
@@ -80,13 +79,3 @@ def forces_of_axles(car: SpeedCar, push: Any) -> tuple[Any, Any]:
     drives = jax.nn.sigmoid(4.0 * push / edge)
     share = drives * car.front_drive + (1.0 - drives) * car.front_brake
     return 0.5 * share * push, 0.5 * (1.0 - share) * push
-
-
-def slip_stiffness(cornering: Any, load: Any) -> Any:
-    """Slip stiffness of a tyre over its load (-) from the cornering stiffness of its axle (N/rad) and its load (N).
-
-    A tyre's longitudinal stiffness is about its lateral one, and larger than that of an axle with a compliant steering. It is
-    limited to 12 to 25 loads, where most car tyres lie (H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed., sec. 4.3.1 and
-    appendix 3).
-    """
-    return jnp.clip(0.5 * cornering / load, 12.0, 25.0)

@@ -19,7 +19,7 @@ from jaxveh.estimators.sequential import (
     update,
     update_by_each,
 )
-from jaxveh.estimators.speed.car_numbers import SpeedCar, forces_of_axles, slip_stiffness
+from jaxveh.estimators.speed.car_numbers import SpeedCar, forces_of_axles
 from jaxveh.estimators.speed.slip_state import (
     FRONT,
     HELD,
@@ -36,6 +36,7 @@ from jaxveh.estimators.speed.slip_state import (
     own_radii,
 )
 from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, wheel_values
+from jaxveh.estimators.two_axles import slip_stiffness
 from jaxveh.numerics import smooth_step
 from jaxveh.vehicles import GRAVITY
 
