@@ -21,7 +21,8 @@ class CurveDoubt(AbstractMethod):
     Below the peak, a curve that saturates late on a road with high friction and one that saturates early on a road with less have
     equal forces: the file's curve alone can be sure of a friction that is wrong by a third. At the peak they agree. The answer is
     the geometric mean of the two. Its variance is the mean of theirs and the square of their distance from it. It is `known`
-    where both are known and their ratio is at most 1 + `agree` (-). For a tyre whose curve is known well, `inner` alone knows more.
+    where both are known and their ratio is at most 1 + `agree` (-). Of a tyre whose curve is known well, `inner` alone knows
+    more.
     """
 
     inner: AbstractMethod
