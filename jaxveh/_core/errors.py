@@ -121,10 +121,13 @@ def did_you_mean(unknown: Iterable[Any], names: Iterable[Any]) -> str:
 
 
 def check_key(who: str, key: Any) -> None:
-    """Raise `InputError` unless `key` is a key of `jax.random`, of the new or the old kind."""
+    """Raise `InputError` unless `key` is one key of `jax.random`, of the new or the old kind."""
     dtype = getattr(key, "dtype", None)
-    if dtype is None or not (jax.numpy.issubdtype(dtype, jax.dtypes.prng_key) or dtype == np.uint32):
+    new = dtype is not None and jax.numpy.issubdtype(dtype, jax.dtypes.prng_key)
+    if not new and dtype != np.uint32:
         raise InputError(f"{who}: key = {key!r}: must be a key of jax.random, e.g. key=jax.random.key(0).")
+    if key.ndim != (0 if new else 1):
+        raise InputError(f"{who}: key has shape {key.shape}: must be one key; use jax.vmap over several.")
 
 
 def float_array(value) -> Any:

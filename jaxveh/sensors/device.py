@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_at_least, check_finite, check_positive
+from jaxveh._core.errors import InputError, check_at_least, check_finite, check_key, check_positive
 from jaxveh._core.names import as_mapping
 from jaxveh.statespace import cast
 
@@ -89,6 +89,8 @@ class AbstractDevice(eqx.Module):
 
         **Raises** `InputError` for a missing output that the device needs, or an output of another shape.
         """
+        if key is not None:
+            check_key(name_of(self), key)
         outputs = self._look(np.shape(times), as_mapping(outputs, "outputs"))
         dtype = next(iter(outputs.values())).dtype
         return cast(self, dtype).say(jnp.asarray(times, dtype), outputs, key)

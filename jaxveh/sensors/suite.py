@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, is_concrete
+from jaxveh._core.errors import InputError, check_key, is_concrete
 from jaxveh._core.names import as_mapping
 from jaxveh.sensors.device import AbstractDevice, check_outputs, name_of
 from jaxveh.sensors.randomness import subkey
@@ -100,6 +100,8 @@ class Suite(eqx.Module):
         **Raises** `InputError` for a missing instant, a missing output that a device needs, an output of another
         length, or if no device sends a sample within the duration.
         """
+        if key is not None:
+            check_key("Suite.record", key)
         truth_times, outputs = _check_truth(truth_times, as_mapping(outputs, "outputs"))
         times = self.sample_times(duration)
         if not times.size:

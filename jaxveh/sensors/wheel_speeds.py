@@ -27,12 +27,13 @@ _LONG = 1e3
 
 
 class _Ring(NamedTuple):
-    """The state of the counter for each wheel: the angle since the last edge (in teeth), the time since it, and the
-    last speed."""
+    """The state of the counter for each wheel: the angle from where the last edge belongs (in teeth), the time since it
+    passed, the last speed, and the error with which the next edge is placed (in teeth)."""
 
     way: Any
     since: Any
     held: Any
+    error: Any
 
 
 class WheelSpeeds(AbstractInstrument):
@@ -125,7 +126,7 @@ class WheelSpeeds(AbstractInstrument):
         spin = 0.5 * (omega + jnp.concatenate([omega[:1], omega[:-1]]))
         teeth = jnp.abs(spin) * (self.period / self.pitch)
         errors = jnp.zeros_like(teeth)
-        if self.tooth_error is not None and key is not None:
+        if self.tooth_error is not None and key is not None and self.method == "M/T":
             errors = self.tooth_error * self._by_wheel(numerics.normal, subkey(key, _TEETH_TAG), teeth[:, 0])
         _, counted = jax.lax.scan(lambda ring, row: self._next(ring, row), self._start(teeth[0], key), (teeth, errors))
         return counted * jnp.sign(spin) if self.signed else counted
@@ -136,27 +137,29 @@ class WheelSpeeds(AbstractInstrument):
             way = self._by_wheel(numerics.uniform, subkey(key, _START_TAG), teeth[0])
         turns = teeth > 0
         since = jnp.where(turns, jnp.minimum(way * self.period / jnp.where(turns, teeth, 1.0), _LONG), _LONG)
-        return _Ring(way, since, self.pitch / self.period * teeth)
+        return _Ring(way, since, self.pitch / self.period * teeth, jnp.zeros_like(teeth))
 
     def _by_wheel(self, draw: Callable, key: Any, like: jax.Array) -> jax.Array:
         """Random numbers in the shape of `like` for each wheel (last axis), independent of which other wheels are measured."""
         return jnp.stack([draw(subkey(key, name), like.shape, like.dtype) for name in self.needs], axis=-1)
 
     def _next(self, ring: _Ring, row: tuple) -> tuple[_Ring, jax.Array]:
-        """One period; `row`: the angle turned in it, `teeth`, and the position error of the last edge in it, `error`."""
+        """One period; `row`: the angle turned in it, `teeth`, and the position error of the edge after its last one."""
         teeth, error = row
         gone = ring.way + teeth
-        edges = jnp.floor(gone)
+        # A slow wheel turns through an edge's error in many periods: the edge keeps its place until it has passed.
+        edges = jnp.maximum(jnp.floor(gone - ring.error), 0.0)
         way = gone - edges
         new = edges > 0
         waited = ring.since + self.period
-        since = jnp.where(new, (way - error) / jnp.where(new, teeth, 1.0) * self.period, waited)
+        passed = jnp.minimum((way - ring.error) / jnp.where(new, teeth, 1.0), 1.0) * self.period
+        since = jnp.where(new, passed, waited)
         # By their errors two edges may be in the wrong order if a wheel passes little more than one edge in a period.
         between = jnp.maximum(waited - since, 1e-3 * self.period)
         slower = jnp.minimum(ring.held, self.pitch / waited)
         timed = jnp.where(new, self.pitch * edges / jnp.where(new, between, 1.0), slower)
         said = timed if self.method == "M/T" else self.pitch / self.period * edges
-        return _Ring(way, since, timed), said
+        return _Ring(way, since, timed, jnp.where(new, error, ring.error)), said
 
 
 def _speed_of(spin: str) -> str:

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import FilterError, InputError, check_whole
+from jaxveh._core.errors import FilterError, InputError, check_key, check_whole
 from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
 from jaxveh.statespace.draw import draw_rows, propagate, schedule_rows
@@ -55,6 +55,7 @@ def posterior_cramer_rao(model: StateSpace, schedule: Recording, key, runs: int 
     `FilterError` if a draw diverges.
     """
     check_whole("runs", runs)
+    check_key("posterior_cramer_rao", key)
     model = strong(model)
     rows = schedule_rows(model, schedule)
     noisy = () if model.process_noise is None else model.process_noise.law.names

@@ -1,6 +1,7 @@
 """Mistakes that newcomers make: each is answered by one message that says what, where, and the remedy."""
 
 import builtins
+import re
 import warnings
 
 import diffrax
@@ -52,7 +53,7 @@ def test_a_forgotten_key(model, drive):
             jaxveh.run(filter, model, drive)
 
 
-@pytest.mark.parametrize("draws", [
+DRAWS = [
     lambda key, model, drive: jaxveh.run(filters.ParticleFilter(100), model, drive, key=key),
     lambda key, model, drive: jaxveh.simulate(vehicles.passenger_car(), manoeuvres.step_steer(25.0, 0.01), DEVICE, key),
     lambda key, model, drive: statespace.draw(model, drive, key),
@@ -62,11 +63,29 @@ def test_a_forgotten_key(model, drive):
     lambda key, model, drive: manoeuvres.random_steering(25.0, 0.01, key),
     lambda key, model, drive: manoeuvres.cruise(25.0, key),
     lambda key, model, drive: roads.rough("A", key),
-])  # fmt: skip
+    lambda key, model, drive: roads.gauss_markov(0.02, 100.0, key),
+    lambda key, model, drive: roads.band(0.02, 100.0, 10.0, key),
+    lambda key, model, drive: manoeuvres.wavering_speed(20.0, 1.0, key),
+    lambda key, model, drive: statespace.posterior_cramer_rao(model, drive, key, runs=3),
+    lambda key, model, drive: sensors.Suite(sensors.IMU("a_x", rate=100.0)).record([0.0], {"a_x": [0.0]}, 0.0, key),
+    lambda key, model, drive: sensors.IMU("a_x", rate=100.0).read([0.0], {"a_x": [0.0]}, key),
+]  # fmt: skip
+"""What draws random numbers from one key."""
+
+
+@pytest.mark.parametrize("draws", DRAWS)
 @pytest.mark.parametrize("key", [0, 1.5, "seed"])
 def test_a_number_in_place_of_a_key(draws, key, model, drive):
     with pytest.raises(InputError, match=rf"key = {key!r}: must be a key of jax.random, e.g. key=jax.random.key\(0\)"):
         draws(key, model, drive)
+
+
+@pytest.mark.parametrize("draws", DRAWS)
+@pytest.mark.parametrize("make", [jax.random.key, jax.random.PRNGKey])
+def test_several_keys_in_place_of_one(draws, make, model, drive):
+    keys = jax.random.split(make(0), 3)
+    with pytest.raises(InputError, match=rf"key has shape {re.escape(str(keys.shape))}: must be one key; use jax.vmap"):
+        draws(keys, model, drive)
 
 
 def test_keys_of_the_old_kind_are_keys(model, drive):

@@ -96,6 +96,28 @@ def test_tooth_errors_spread_the_timed_speeds():
     np.testing.assert_allclose(said.mean(), omega, rtol=1e-4)
 
 
+@pytest.mark.parametrize("error", [0.03, 0.1])
+def test_tooth_errors_of_wheels_at_any_speed_stay_errors_of_a_pitch(error):
+    """From standstill to 200 rad/s: never negative, and the angle that was said is the wheel's, to within some pitches."""
+    rng = np.random.default_rng(0)
+    t = np.arange(ROWS) / RATE
+    for seed, top in enumerate((0.01, 0.1, 0.5, 2.0, 10.0, 200.0)):
+        omega = top * np.abs(np.sin(rng.uniform(0.1, 2.0) * t)) * rng.uniform(0.5, 1.0)
+        said = spin(ring(tooth_error=error), omega, jax.random.key(seed))
+        assert np.all(np.isfinite(said)) and np.all(said >= 0.0), top
+        # The ways between two edges differ from the pitch by the two edges' errors, each of at most five deviations.
+        assert np.all(said <= max(omega.max(), PITCH * RATE * (top > 2.0)) * (1 + 10 * error) + PITCH / t[-1]), top
+
+
+def test_a_slow_wheel_has_the_tooth_errors_of_a_quick_one():
+    """An edge in 40 periods: the time from edge to edge is right within a period, and spreads by two edges' errors."""
+    error, omega = 0.05, PITCH * RATE / 40
+    said = spin(ring(tooth_error=error), np.full(40_000, omega), jax.random.key(1))
+    timed = said[1:][np.diff(said) != 0]
+    np.testing.assert_allclose(np.mean(omega / timed), 1.0, rtol=0.02)
+    assert 0.5 * np.sqrt(2) * error < np.std(omega / timed) < 1.5 * np.sqrt(2) * error
+
+
 def test_the_lowest_speed_and_what_is_said_below():
     omega = np.concatenate([np.full(50, 6.0), np.full(50, 3.0)])
     zero, nothing = spin(ring(lowest=4.0), omega), spin(ring(lowest=4.0, below="nan"), omega)
