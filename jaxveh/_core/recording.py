@@ -51,7 +51,9 @@ class Recording(Kept, eqx.Module):
 
     def __check_init__(self):
         if self.time.ndim != 1 or self.time.shape[0] == 0:
-            raise InputError(f"recording: time has shape {self.time.shape}; it must be (T,) with at least one row.")
+            raise InputError(
+                f"recording: time has shape {self.time.shape}; it must be (T,) with at least one row.{_several(self)}"
+            )
         for name, values in self.channels.items():
             if values.shape != self.time.shape:
                 raise InputError(f"recording: {name} has shape {values.shape}, time has {self.time.shape}; must agree.")
@@ -149,6 +151,7 @@ class Recording(Kept, eqx.Module):
         finite sample, and for `linear` those after the last. Runs on the host, outside jit.
         """
         check_one_of("method", method, ("hold", "linear"))
+        check_recording("recording.fill", self)
         values, time = np.array(self[channel]), np.asarray(self.time)
         known = np.flatnonzero(np.isfinite(values))
         missing = np.flatnonzero(np.isnan(values))
@@ -267,3 +270,22 @@ def _kind_of(one) -> str:
     if isinstance(one, datetime.date | datetime.timedelta):
         return "M" if isinstance(one, datetime.date) else "m"
     return np.asarray(one).dtype.kind
+
+
+def check_recording(who: str, recording: Any) -> None:
+    """Raise `InputError` unless it is a `Recording` of one drive; those that `jax.vmap` returns hold several."""
+    if not isinstance(recording, Recording):
+        raise InputError(
+            f"{who}: recording = {type(recording).__name__}: must be a Recording: jaxveh.Recording(time, {{name: values}}), or "
+            "the result of io.read_recording or simulate."
+        )
+    if np.ndim(recording.time) != 1:
+        raise InputError(
+            f"{who}: recording.time has shape {np.shape(recording.time)}: must be (T,), one drive.{_several(recording)}"
+        )
+
+
+def _several(recording: Recording) -> str:
+    """What to do with several drives in one, as `jax.vmap` returns them; "" for one."""
+    one = " Take one of several, jax.tree.map(lambda leaf: leaf[0], recordings), or use jax.vmap over them."
+    return one if np.ndim(recording.time) > 1 else ""

@@ -15,6 +15,7 @@ from jaxveh.cli import options
 from jaxveh.cli.console import results
 from jaxveh.cli.drives import COLOURS
 from jaxveh.cli.output import check_report, make_folder, write_numbers
+from jaxveh.cli.vehicle import car_of
 from jaxveh.diagnostics import kit
 
 ORDER = tuple(COLOURS)
@@ -25,7 +26,9 @@ def check(
     vehicle: Annotated[
         Path | None,
         typer.Option(
-            "--vehicle", metavar="CAR.toml", help="The car; adds the checks that need a car (steering offset, signs)."
+            "--vehicle",
+            metavar="CAR",
+            help="The car, its file or a name; adds the checks that need a car (steering offset, signs).",
         ),
     ] = None,
     channels: options.Channels = None,
@@ -40,7 +43,7 @@ def check(
     """
     check_report(out, numbers)
     recording = io.read_recording(log, channels)
-    car = None if vehicle is None else io.read_car(vehicle)
+    car = None if vehicle is None else car_of(vehicle)
     findings = diagnostics.check_log(recording, car=car)
     _print(log, recording, findings)
     if out is not None:

@@ -20,6 +20,7 @@ from jaxveh.cli.drives import Drive, read_drives
 from jaxveh.cli.estimate_figures import draw
 from jaxveh.cli.estimate_report import check_report_page, reported_log, write_report
 from jaxveh.cli.output import check_product, check_products, check_report, write_numbers
+from jaxveh.cli.vehicle import car_of
 from jaxveh.diagnostics import kit
 
 MCAP_SUFFIX = io.kit.MCAP_SUFFIX
@@ -43,8 +44,8 @@ PRODUCT = typer.Option(
 )
 VEHICLE = typer.Option(
     "--vehicle",
-    metavar="CAR.toml",
-    help="The car (jaxveh schema car); not needed with --calibration, whose file contains the car.",
+    metavar="CAR",
+    help=f"The car: {options.CAR_HELP}; not needed with --calibration, whose file contains the car.",
     show_default=False,
 )
 CALIBRATION = typer.Option(
@@ -180,7 +181,7 @@ class Choice(NamedTuple):
 def _estimate(choice: Choice) -> tuple[Any, dict[str, Any]]:
     """Return the calibration (None if the values of the car file are used), and the numbers of each log by its name."""
     products = _check(choice)
-    told = None if choice.vehicle is None else io.read_car(choice.vehicle)
+    told = None if choice.vehicle is None else car_of(choice.vehicle)
     found = None if choice.calibration is None else sideslip.read_calibration(choice.calibration, told)
     car = _car(told, found)
     used = (choice.truth, *choice.calibrate_on)

@@ -19,8 +19,10 @@ Log = Annotated[Path, typer.Argument(metavar="LOG", help=LOG_HELP, show_default=
 
 Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help=LOG_HELP, show_default=False)]
 
+CAR_HELP = "its file (jaxveh schema car), or a name (jaxveh simulate --list)"
+
 VehicleFile = Annotated[
-    Path, typer.Option("--vehicle", metavar="CAR.toml", help="The car (jaxveh schema car).", show_default=False)
+    Path, typer.Option("--vehicle", metavar="CAR", help=f"The car: {CAR_HELP}.", show_default=False)
 ]
 
 Channels = Annotated[

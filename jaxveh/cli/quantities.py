@@ -17,6 +17,7 @@ from jaxveh.cli.drives import read_log
 from jaxveh.cli.missing_speed import with_speed
 from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
 from jaxveh.cli.quantity_options import QUANTITIES, USUAL_FILTER, USUAL_PARTICLES
+from jaxveh.cli.vehicle import car_of
 from jaxveh.estimators import Answers, Compared, MethodScore
 from jaxveh.io import CarSpecification
 
@@ -143,10 +144,10 @@ def _check(asked: Asked) -> tuple[list[Path], CarSpecification]:
         check_one_of("--truth", asked.truth.removeprefix(TRUTH), sorted(shown))
     if len(asked.logs) == 1:
         check_product(asked.product, io.SUFFIXES, asked.force, sources)
-        return [asked.product], io.read_car(asked.vehicle)
+        return [asked.product], car_of(asked.vehicle)
     products = [asked.product / f"{log.stem}.parquet" for log in asked.logs]
     check_products(asked.product, products, asked.force, sources)
-    return products, io.read_car(asked.vehicle)
+    return products, car_of(asked.vehicle)
 
 
 def _log(asked: Asked, log: Path, car: CarSpecification) -> tuple[Recording, Recording]:

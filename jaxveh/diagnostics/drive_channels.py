@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from jaxveh._core.errors import InputError, did_you_mean
-from jaxveh._core.recording import TRUTH, Recording
+from jaxveh._core.recording import TRUTH, Recording, check_recording
 
 LONGEST_GAP = 0.5
 """Longest gap that is bridged for a number of a standard, s; our choice. Satellite navigation at 5 Hz has no longer gaps."""
 
 
 def has(recording: Recording, *names: str) -> bool:
-    """Whether the recording has all of these channels, as truth or measured."""
+    """Whether the recording has all of these channels, as truth or measured. Raises `InputError` if it is not of one drive."""
+    check_recording("drive", recording)
     return all(TRUTH + name in recording or name in recording for name in names)
 
 
@@ -79,7 +80,8 @@ def _samples(recording: Recording, name: str) -> np.ndarray:
 
 
 def seconds(recording: Recording) -> np.ndarray:
-    """Return the recording's own time, s."""
+    """Return the recording's own time, s. Raises `InputError` if it is not of one drive."""
+    check_recording("drive", recording)
     return np.asarray(recording.time, np.float64)
 
 

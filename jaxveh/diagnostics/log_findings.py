@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh.io import CarSpecification
 
 SEVERITIES = ("ok", "note", "warning", "error")
@@ -48,6 +48,7 @@ class LogView:
     @classmethod
     def of(cls, recording: Recording, car: CarSpecification | None) -> LogView:
         """Make a view of the measured channels of a recording, without a simulation's truth."""
+        check_recording("check_log", recording)
         names = [name for name in recording.names if not name.startswith("true.")]
         channels = {name: np.asarray(recording[name], dtype=np.float64) for name in names}
         return cls(np.asarray(recording.time, dtype=np.float64), channels, car)

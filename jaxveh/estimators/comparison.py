@@ -52,6 +52,10 @@ def compare(
     A method that needs a key missing from the car's file or a channel missing from the log is `refused` with the reason. If
     it was named in `methods`, it **raises** `InputError` instead, as does an unknown name.
     """
+    if not hasattr(quantity, "METHODS"):
+        raise InputError(
+            f"compare: quantity = {quantity!r}: must be a module with METHODS, such as estimators.sideslip."
+        )
     names = list(quantity.METHODS) if methods is None else list(methods)
     compared = Compared({}, {}, {})
     for name in names:

@@ -31,7 +31,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.labelled import Labelled
 from jaxveh._core.overview import Overview
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh._core.shown import Shown, above
 from jaxveh.fitting import Fit
 from jaxveh.io import CarSpecification
@@ -55,6 +55,7 @@ def check_needs(who: str, needs: tuple[Need, ...], recording: Recording, model: 
 
     An optional channel is needed where the `model` reads it.
     """
+    check_recording(who, recording)
     read = () if model is None else (*model.inputs, *model.channels)
     wanted = [need for need in needs if not need.optional or need.channel in read]
     missing = [f"{need.channel} ({need.unit})" for need in wanted if need.channel not in recording]
@@ -197,6 +198,8 @@ def spans_of(
     recordings = [recording] if isinstance(recording, Recording) else list(recording)
     if not recordings:
         raise InputError(f"{who}: no log to calibrate on: give a recording, or several of one car.")
+    for one in recordings:
+        check_recording(who, one)
     spans = tuple(Span(float(one.time[0]), float(one.time[-1])) for one in recordings)
     for i, span in enumerate(spans):
         if span.end - span.start < shortest:

@@ -13,6 +13,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh._core.recording import Recording
+from jaxveh.estimators.contract import Need, check_needs
 from jaxveh.io import CarSpecification, with_road_steer
 from jaxveh.statespace import Propagate, Row
 from jaxveh.tyres import AbstractDynamicTyre, Linear
@@ -24,6 +25,7 @@ def _derivatives(car: SingleTrack, t, x, u):
 
 
 PROPAGATE = Propagate(_derivatives)
+NEEDS = (Need("steer", "rad", throughout=True), Need("v_x", "m/s", throughout=True))
 
 
 def open_loop(car: Any, recording: Recording) -> dict[str, np.ndarray]:
@@ -31,9 +33,10 @@ def open_loop(car: Any, recording: Recording) -> dict[str, np.ndarray]:
 
     It has the axles' own cornering stiffnesses at their static loads, without load transfer: `car` is a single track, or any car
     of which `vehicles.linear_single_track` makes one. **Returns** by name, (T,) each: `v_y` (m/s), `yaw_rate` (rad/s),
-    `sideslip` (rad). **Raises** `InputError` for missing channels, for a car without axles, or one that needs more inputs than
-    `steer`.
+    `sideslip` (rad). **Raises** `InputError` for channels that are missing or have gaps, for a car without axles, or one that
+    needs more inputs than `steer`.
     """
+    check_needs("open_loop", NEEDS, recording)
     time = recording.time
     if isinstance(time, np.ndarray):
         # So that float32 resolves the steps of a log whose stamps count from 1970.

@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import as_mapping
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.log import numeric, split_unit
 from jaxveh.io.optional import require
@@ -30,6 +30,7 @@ def to_frame(data: Any) -> Any:
     """
     pandas = require("pandas", "making a data frame")
     if isinstance(data, Recording):
+        check_recording("to_frame", data)
         columns, units, source = dict(data.channels), dict(data.units), data.source
     else:
         columns, source = _estimate(data), ""

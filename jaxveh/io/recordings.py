@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, JaxvehWarning
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
 from jaxveh.io.csv_log import open_csv, write_csv
@@ -164,6 +164,7 @@ def write_recording(recording: Recording, path: str | os.PathLike, *, overwrite:
     The file is written completely or not at all. **Raises** `InputError` for another suffix, or if the file exists and
     `overwrite` is False.
     """
+    check_recording("write_recording", recording)
     columns = {name: np.asarray(values) for name, values in recording.channels.items()}
     write_columns(path, np.asarray(recording.time), columns, dict(recording.units), recording.source, overwrite)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.names import check_names, record_type
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh.manoeuvres.base import AbstractManoeuvre
 from jaxveh.vehicles import kit
 
@@ -43,6 +43,7 @@ def replay(recording: Recording, channels: tuple[str, ...] | None = None) -> Rep
     **Raises** `InputError` for a missing channel, fewer than two rows, or a channel that is not finite throughout (fill
     its gaps first; checked outside jit).
     """
+    check_recording("replay", recording)
     if channels is None:
         more = ("a_x", *(name for name in kit.STEER_UNITS if name != "steer"))
         channels = ("steer", "v_x", *(name for name in more if name in recording))

@@ -13,7 +13,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, float_array, is_concrete
 from jaxveh._core.names import check_names, record
 from jaxveh._core.parameter import UNNAMED
-from jaxveh._core.recording import Recording, time_for
+from jaxveh._core.recording import Recording, check_recording, time_for
 from jaxveh._core.traced import trace_once
 from jaxveh.statespace.dependent_noise import MeasurementNoise, StateDependent
 from jaxveh.statespace.noise import AbstractNoise, Gaussian
@@ -156,17 +156,24 @@ class StateSpace(eqx.Module):
         Raises `InputError` for a missing channel, NaN in an input (fill it first with `recording.fill`), or infinite values.
         In float32, times count from the first row, so that steps keep their digits.
         """
-        if not isinstance(recording, Recording):
-            raise InputError(
-                f"recording = {type(recording).__name__}: must be a Recording: jaxveh.Recording(time, {{name: values}}), or the "
-                "result of io.read_log or simulate."
-            )
+        check_recording("StateSpace.rows", recording)
+        self._check_one()
         check_names("recording lacks a channel the model needs", (*self.inputs, *self.channels), recording.names)
         dtype = self.prior.mean[0].dtype
         u = {name: _channel(recording, name, dtype, is_input=True) for name in self.inputs}
         y = {name: _channel(recording, name, dtype, is_input=False) for name in self.channels}
         time = jnp.asarray(time_for(recording, dtype), dtype)
         return Row(time, record("Inputs", u), record("Measurements", y))
+
+    def _check_one(self) -> None:
+        """Raise `InputError` for several models in one, as `jax.vmap` returns them: the prior's means are then no numbers."""
+        wide = {name: np.shape(mean) for name, mean in zip(self.states, self.prior.mean, strict=True) if np.ndim(mean)}
+        if wide:
+            shapes = ", ".join(f"{name} has shape {shape}" for name, shape in wide.items())
+            raise InputError(
+                f"StateSpace: prior.mean: {shapes}: must be one number each. For several models at once use jax.vmap, e.g. "
+                "jax.vmap(lambda model: jaxveh.run(filter, model, recording))(models)."
+            )
 
     def row(self, t, u: Mapping, y: Mapping) -> Row:
         """One row for a live loop from plain numbers; channels left out of `y` are missing."""

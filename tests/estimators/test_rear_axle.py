@@ -213,7 +213,7 @@ def test_a_coarse_logs_steps_are_the_integral_of_what_is_slow():
 
 def test_a_span_in_which_nothing_drives_or_is_measured_is_refused():
     log = drive_of(test_sideslip.CAR, seconds=25.0).without("v_y")
-    with pytest.raises(InputError, match="no row of the .* s is fast enough and measured"):
+    with pytest.raises(InputError, match="no row is fast enough and measured"):
         estimators.sideslip.calibrate(test_sideslip.CAR, log.replace(v_x=np.zeros(len(log))))
     with pytest.raises(InputError, match="yaw_rate .* is NaN in every row"):
         estimators.sideslip.calibrate(test_sideslip.CAR, log.replace(yaw_rate=np.full(len(log), np.nan)))
