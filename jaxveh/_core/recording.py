@@ -13,7 +13,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_one_of, is_concrete
 from jaxveh._core.labelled import TIME, Labelled, Variable, make_again, time_again, time_axis
-from jaxveh._core.names import check_names
+from jaxveh._core.names import as_names, check_names
 from jaxveh._core.overview import Lazy, Overview, count_of, is_known, missing_share, number, span, stretch
 from jaxveh._core.shown import Kept, above
 
@@ -121,7 +121,8 @@ class Recording(Kept, eqx.Module):
         return Recording(self.time, {**self.channels, **channels}, merged, self.source if source is None else source)
 
     def select(self, names) -> Recording:
-        """Return a recording of these channels alone."""
+        """Return a recording of these channels alone: a name, or several."""
+        names = as_names(names)
         check_names("recording.select", names, self.channels)
         units = {name: unit for name, unit in self.units if name in names}
         return Recording(self.time, {name: self.channels[name] for name in names}, units, self.source)

@@ -27,6 +27,10 @@ def car(vehicle: AbstractVehicle | CarSpecification, *, figure: Any = None) -> A
     **Returns** the figure; `figure`: the figure to draw into. **Raises** `InputError` for a car without wheels, or a batch of
     cars.
     """
+    if not isinstance(vehicle, AbstractVehicle | CarSpecification):
+        raise InputError(
+            f"plots.car: vehicle = {type(vehicle).__name__}: must be a vehicle, or a car's file (io.read_car)."
+        )
     places = _places(vehicle)
     if any(np.ndim(number) for place in places for number in place):
         raise InputError("plots.car: a batch of cars: must be one, such as jax.tree.map(lambda leaf: leaf[0], cars).")

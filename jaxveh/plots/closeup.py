@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
-from jaxveh._core.names import as_mapping, check_names
+from jaxveh._core.names import as_mapping, as_names, check_names
 from jaxveh._core.recording import Recording
-from jaxveh.plots.estimates import BAND, bands
+from jaxveh.plots.estimates import BAND, bands, check_estimate
 from jaxveh.plots.quantities import quantity
 from jaxveh.plots.style import COLOURS, CYCLE, label_above, legend, new_figure, style
 
@@ -41,9 +41,10 @@ def closeup(
 
     **Returns** the figure. **Raises** `InputError` for unknown names, rows that do not agree, or if there is no finite value.
     """
+    check_estimate("plots.closeup", estimate, "mean", "std")
     mean = as_mapping(estimate.mean, "mean")
     check_names("plots.closeup", [quantity_name], mean)
-    shown_channels = [name for name in CHANNELS if name in recording] if channels is None else list(channels)
+    shown_channels = [name for name in CHANNELS if name in recording] if channels is None else list(as_names(channels))
     check_names("plots.closeup", shown_channels, recording.names)
     start, end, why = worst_span(estimate, recording, truth, quantity_name, seconds=seconds, least_speed=least_speed)
     time = np.asarray(estimate.time)

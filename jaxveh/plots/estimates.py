@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
-from jaxveh._core.names import as_mapping, check_names
+from jaxveh._core.names import as_mapping, as_names, check_names
 from jaxveh._core.recording import Recording
 from jaxveh.plots.quantities import quantity
 from jaxveh.plots.style import COLOURS, colour, label_above, legend, new_figure, style
@@ -34,6 +34,20 @@ class Shown(NamedTuple):
     def has_truth(self, name: str) -> bool:
         """Whether there is a truth of a quantity."""
         return self.truth is not None and name in self.truth
+
+
+def check_estimate(who: str, estimate: Any, *fields: str) -> None:
+    """Raise `InputError` unless it has `time` (T,) and the `fields`: several runs, as `jax.vmap` returns them, have no such
+    time."""
+    if not all(hasattr(estimate, name) for name in ("time", *fields)):
+        raise InputError(
+            f"{who}: estimate = {type(estimate).__name__}: must have time, {' and '.join(fields)}, as an Estimate of jaxveh.run."
+        )
+    if np.ndim(estimate.time) != 1:
+        raise InputError(
+            f"{who}: estimate.time has shape {np.shape(estimate.time)}: must be (T,), one run. Take one of several, "
+            "jax.tree.map(lambda leaf: leaf[0], estimates)."
+        )
 
 
 def estimate(
@@ -62,9 +76,11 @@ def estimate(
     labelled = dict(estimates) if isinstance(estimates, Mapping) else {"estimate": estimates}
     if not labelled:
         raise InputError("plots.estimate: no estimate to show; give at least one.")
+    for one in labelled.values():
+        check_estimate("plots.estimate", one, "mean", "std")
     first = next(iter(labelled.values()))
     known = as_mapping(first.mean, "mean")
-    names = list(known if quantities is None else quantities)
+    names = list(known if quantities is None else as_names(quantities))
     check_names("plots.estimate", names, known)
     if errors and truth is None:
         raise InputError("plots.estimate: errors need a truth; give `truth=`, or leave `errors` out.")

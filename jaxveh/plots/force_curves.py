@@ -10,6 +10,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh.plots.style import COLOURS, colour, legend, new_figure, style
+from jaxveh.plots.tyres import check_tyre
 from jaxveh.tyres import Contact
 
 POINTS = 200
@@ -35,6 +36,9 @@ def force_curves(
     """
     for axle in AXLES:
         check_one_of("axle", axle, tuple(slips))
+    for label, car in cars.items():
+        for axle in AXLES:
+            check_tyre(f"plots.force_curves: {label}.{axle}", getattr(car, axle, None))
     errors = errors and "truth" in cars and len(cars) > 1
     with style():
         figure = new_figure(4.6 if errors else 3.0) if figure is None else figure

@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_finite, check_positive
 from jaxveh.plots.style import COLOURS, legend, new_figure, style
-from jaxveh.plots.tyres import forces_at
+from jaxveh.plots.tyres import check_tyre, forces_at
 from jaxveh.tyres import AbstractTyre
 
 POINTS = 301
@@ -41,6 +41,7 @@ def friction_ellipse(
     `figure`: the figure to draw into. **Returns** the figure. **Raises** `InputError` for a load or a range of slip that is not
     positive, a negative slip angle, or a law without one of the two forces.
     """
+    check_tyre("plots.friction_ellipse", law)
     _check(load, slip_angles, slip_angle, slip_ratio)
     ratio = slip_ratio * _dense_at_zero()
     grid = forces_at(law, load, slip_angle * _dense_at_zero()[:, None], ratio[None, :])

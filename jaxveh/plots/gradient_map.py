@@ -12,7 +12,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.parameter import Parameter, Where, pick, put, resolve
 from jaxveh.plots.style import new_figure, style
-from jaxveh.plots.tyres import SLIP_ANGLE, SLIP_RATIO
+from jaxveh.plots.tyres import SLIP_ANGLE, SLIP_RATIO, check_tyre
 from jaxveh.tyres import AbstractTyre, Contact
 
 POINTS = 121
@@ -57,6 +57,7 @@ def gradient_map(
     `law`: a tyre without states; `figure`: the figure to draw into. **Returns** the figure. **Raises** `InputError` for a load or
     a range of slip that is not positive, or if `where` picks something that is not a leaf.
     """
+    check_tyre("plots.gradient_map", law)
     check_positive("load", load, "N")
     check_positive("slip_angle", slip_angle, "rad")
     check_positive("slip_ratio", slip_ratio, "-")

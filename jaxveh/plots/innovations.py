@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh.diagnostics import chi_squared_band, nis_by_channel, whiteness
+from jaxveh.plots.estimates import check_estimate
 from jaxveh.plots.style import COLOURS, CYCLE, label_above, legend, new_figure, style
 
 FAINT = "#9a9a9a"
@@ -71,6 +72,7 @@ def innovation_points(estimate: Any, *, seconds: float = 1.0, lags: int = 100) -
     """
     check_positive("seconds", seconds, "s")
     filtered = getattr(estimate, "filtered", estimate)
+    check_estimate("plots.innovations", filtered, "info")
     time = np.asarray(filtered.time, np.float64)
     if time.size < 8:
         raise InputError(f"plots.innovations: {time.size} rows are too few.")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh._core.names import check_names
+from jaxveh._core.names import as_names, check_names
 from jaxveh._core.recording import TRUTH, Recording, check_recording
 from jaxveh.plots.quantities import order, quantity
 from jaxveh.plots.style import COLOURS, CYCLE, SHADE, label_above, legend, new_figure, style
@@ -33,7 +33,7 @@ def recording(
     **Returns** the figure. **Raises** `InputError` for unknown channels, or if there is no channel.
     """
     check_recording("plots.recording", recording)
-    names = list(channels) if channels is not None else _default(recording)
+    names = list(as_names(channels)) if channels is not None else _default(recording)
     check_names("plots.recording", names, recording.names)
     if not names:
         raise InputError("plots.recording: no channel to show; name at least one.")

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import check_one_of
+from jaxveh._core.names import as_names
 from jaxveh.fitting import RigFit, kit
 from jaxveh.io import RigTable
 from jaxveh.plots.style import new_figure, style
@@ -60,7 +61,7 @@ def rig_fit(fit: RigFit, rig: RigTable, channels: Sequence[str] | None = None, *
 
     **Raises** `InputError` for a channel that was not fitted.
     """
-    chosen = tuple(fit.rmse) if channels is None else tuple(channels)
+    chosen = tuple(fit.rmse) if channels is None else as_names(channels)
     for name in chosen:
         check_one_of("channels", name, tuple(fit.rmse))
     with style():

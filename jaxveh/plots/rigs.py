@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.names import check_names
+from jaxveh._core.names import as_names, check_names
 from jaxveh.io import RigTable, kit
 from jaxveh.plots.rig_fit import COLOUR_MAP, DOTS, QUANTITIES, SLIPS, slip_of
 from jaxveh.plots.style import new_figure, style
@@ -21,7 +21,7 @@ def rig(rig: RigTable, channels: Sequence[str] | None = None, *, figure: Any = N
     **Raises** `InputError` for a channel that was not measured.
     """
     there = [name for name in kit.RIG_CHANNELS if getattr(rig, name) is not None]
-    names = there if channels is None else list(channels)
+    names = there if channels is None else list(as_names(channels))
     check_names("plots.rig", names, there)
     with style():
         figure = new_figure(2.4 * len(names)) if figure is None else figure

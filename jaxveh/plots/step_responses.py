@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from jaxveh._core.names import as_names
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import StepResponse, drive_channels, kit
 from jaxveh.diagnostics import step_response as measure
@@ -27,7 +28,7 @@ def step_response(
 
     **Returns** the figure. **Raises** `InputError` if the recording has no such step, or an output is missing.
     """
-    outputs = list(outputs)
+    outputs = list(as_names(outputs))
     with style():
         figure, axes = stack(figure, 1 + len(outputs), 1.4)
         line(axes[0], recording, "steer")

@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxveh._core.errors import InputError, check_positive
 from jaxveh.plots.style import CYCLE, legend, new_figure, style
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
 
@@ -43,8 +44,16 @@ def tyre(law: AbstractTyre, loads: Sequence[float] = LOADS, *, speed: float = SP
     Lateral force and aligning moment over slip angle, and longitudinal force over slip ratio, are at `loads` (N); lateral over
     longitudinal force is at several slip angles and the middle load; all are at a forward `speed` (m/s). What the law does not
     have, such as the aligning moment of a lateral law, has no panel. A tyre with states is in its steady state. **Returns** the
-    figure; `figure`: the figure to draw into.
+    figure; `figure`: the figure to draw into. **Raises** `InputError` for loads or a speed that are not positive, no load, or
+    several tyres.
     """
+    check_tyre("plots.tyre", law)
+    loads = np.atleast_1d(loads).tolist()
+    if not loads:
+        raise InputError("plots.tyre: loads are empty: give at least one load (N).")
+    for load in loads:
+        check_positive("loads", load, "N")
+    check_positive("speed", speed, "m/s")
     across, along, moment = _over_slip(law, loads, speed)
     both = _varies(across) and _varies(along)
     panels = [panel for panel in (across, along, moment) if _varies(panel)] or [across]
@@ -94,6 +103,22 @@ def _combined(law: AbstractTyre, load: float, speed: float) -> Panel:
 def _varies(panel: Panel) -> bool:
     """Whether any of its lines is something else than zero."""
     return any(np.any(np.asarray(y) != 0) for _, y, _ in panel.lines)
+
+
+def check_tyre(who: str, law: Any) -> None:
+    """Raise `InputError` for what is no tyre, and for several tyres in one, as `jax.vmap` returns them."""
+    if not isinstance(law, AbstractTyre | AbstractDynamicTyre):
+        raise InputError(
+            f"{who}: law = {type(law).__name__}: must be a tyre, such as tyres.typical_mf_tyre or car.front."
+        )
+    number = jnp.zeros(())
+    try:
+        found = eqx.filter_eval_shape(_evaluate, law, Contact(number, number, number + 1.0, speed=number + 1.0))
+        one = all(getattr(leaf, "shape", ()) == () for leaf in jax.tree.leaves(found))
+    except (TypeError, ValueError):
+        one = False
+    if not one:
+        raise InputError(f"{who}: several tyres: must be one, such as jax.tree.map(lambda leaf: leaf[0], tyres).")
 
 
 def forces_at(law: AbstractTyre, load: float, slip_angle: Any, slip_ratio: Any, speed: float | None = None) -> Any:
