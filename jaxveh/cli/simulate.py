@@ -100,7 +100,7 @@ def simulate(
             until=until and EVENTS[until](),
         )  # fmt: skip
     found = numbers_of(recording, asked, car)
-    print_numbers(found)
+    _print(found, recording, until, driver.duration)
     _keep(recording, product, asked, car, out, force)
     configuration = {
         "vehicle": vehicle, "fidelity": fidelity, "manoeuvre": manoeuvre, "speed": asked.speed, "steer_deg": asked.steer_deg,
@@ -108,6 +108,13 @@ def simulate(
         "yaw_rate_std": yaw_rate_std, "a_y_std": a_y_std, "solver": solver, "until": until,
     }  # fmt: skip
     write_numbers(numbers, {**_summary(recording, product), "numbers": found}, configuration, seed)
+
+
+def _print(found: dict[str, Any], recording: Recording, until: str | None, duration: float) -> None:
+    """Print the numbers, and whether the event that should end the drive has not come."""
+    if until is not None and recording.time[-1] > duration - 0.05:
+        results().print(f"note: --until {until}: it does not happen within {duration:g} s.", soft_wrap=True)
+    print_numbers(found)
 
 
 def _summary(recording: Recording, product: Path | None) -> dict[str, Any]:

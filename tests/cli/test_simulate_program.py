@@ -253,6 +253,17 @@ def test_braking_ends_at_standstill(tmp_path):
     assert 0.5 < recording.time[-1] < 2.0
     assert 0.05 < recording["true.v_x"][-1] < 0.5
     assert "braking (UN R13-H): " in result.stdout and "mean_deceleration" in result.stdout
+    assert "note: --until" not in result.stdout
+
+
+def test_an_event_that_does_not_happen_is_told(capsys):
+    from jaxveh import Recording
+    from jaxveh.cli.simulate import _print
+
+    _print({}, Recording([0.0, 0.5, 1.0], {}), "standstill", 1.0)
+    assert "note: --until standstill: it does not happen within 1 s." in capsys.readouterr().out
+    _print({}, Recording([0.0, 0.5], {}), "standstill", 1.0)
+    assert "--until" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
