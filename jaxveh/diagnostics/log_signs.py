@@ -13,6 +13,9 @@ AGREE = 0.5
 SCALED = 0.8
 """Correlation above which a slope other than 1 is attributed to a unit; below it a channel may be damaged or late."""
 
+SHIFTED = 1.0
+"""m/s^2: a unit scales a channel and does not shift it: with a larger intercept no slope is attributed to one."""
+
 # The units that explain a slope other than 1, for a_y over v_x yaw_rate and for a_x over dv_x/dt.
 _LATERAL = {
     1 / 3.6: ("v_x", "km/h"),
@@ -87,7 +90,8 @@ def check_signs(log: LogView) -> list[LogFinding]:
     if steering is not None:
         findings.append(_steering(steering, _correlation(log, GENTLE), lateral))
     if lateral is not None:
-        findings.append(_slope("a_y", "v_x yaw_rate", lateral, _LATERAL, "yaw_rate or a_y"))
+        slides = _slides(lateral, _lateral(log, GENTLE))
+        findings.append(slides or _slope("a_y", "v_x yaw_rate", lateral, _LATERAL, "yaw_rate or a_y"))
     if log.has("v_x", "v_y", "yaw_rate", "a_y"):
         findings += _sideways(log)
     if log.has("v_x", "a_x"):
@@ -103,19 +107,24 @@ def check_signs(log: LogView) -> list[LogFinding]:
 def _correlation(log: LogView, most: float = np.inf) -> float:
     """The correlation of yaw rate and steer where |v_x yaw_rate| has been at most `most` (m/s^2) for half a second, and stays."""
     steer, yaw_rate = log.smooth(log.even("steer"), 0.2), log.smooth(log.even("yaw_rate"), 0.2)
-    with np.errstate(invalid="ignore"):
-        hard = np.abs(log.even("v_x") * yaw_rate) > most
-    around = 2 * round(0.5 / log.step) + 1
-    if hard.size >= around:
-        yaw_rate = np.where(np.convolve(hard, np.ones(around), "same") > 0.5, np.nan, yaw_rate)
+    yaw_rate = _gentle(log, log.even("v_x") * yaw_rate, most, yaw_rate)
     coefficients, _, correlation = fit(log.while_moving(yaw_rate), steer)
     return correlation * float(np.sign(coefficients[1]))
 
 
-def _lateral(log: LogView) -> tuple[float, float, float]:
-    """Return slope, intercept and correlation of a_y over v_x yaw_rate."""
+def _gentle(log: LogView, push: np.ndarray, most: float, values: np.ndarray) -> np.ndarray:
+    """The values where |push| (m/s^2) has been at most `most` for half a second, and stays; NaN elsewhere."""
+    with np.errstate(invalid="ignore"):
+        hard = np.abs(push) > most
+    around = 2 * round(0.5 / log.step) + 1
+    return np.where(np.convolve(hard, np.ones(around), "same") > 0.5, np.nan, values) if hard.size >= around else values
+
+
+def _lateral(log: LogView, most: float = np.inf) -> tuple[float, float, float]:
+    """Return slope, intercept and correlation of a_y over v_x yaw_rate where |a_y| has been at most `most` (m/s^2) for half a
+    second, and stays."""
     speed, yaw_rate = log.even("v_x"), log.even("yaw_rate")
-    target = log.while_moving(log.smooth(log.even("a_y"), 0.2))
+    target = log.while_moving(_gentle(log, log.even("a_y"), most, log.smooth(log.even("a_y"), 0.2)))
     turning = log.smooth(speed * yaw_rate, 0.2)
     coefficients, _, correlation = fit(target, turning)
     return float(coefficients[1]), float(coefficients[0]), correlation
@@ -170,6 +179,15 @@ def _steering(correlation: float, gently: float, lateral: tuple[float, float, fl
     return LogFinding("error", "steer" if wrong == "steer or yaw_rate" else wrong, message, values)
 
 
+def _slides(line: tuple[float, float, float], gently: tuple[float, float, float]) -> LogFinding | None:
+    """The finding that a_y differs from v_x yaw_rate, but not in gentle turns, as of a car that spins; None otherwise."""
+    same = lambda slope: slope > 0 and abs(np.log(slope)) < np.log(1.35)
+    if same(line[0]) or not same(gently[0]) or gently[2] < SCALED:
+        return None
+    message = f"is {line[0]:.3g} times v_x yaw_rate, in gentle turns {gently[0]:.3g} times: a car that slides."
+    return LogFinding("note", "a_y", message, {"slope": line[0], "gently": gently[0], "correlation": gently[2]})
+
+
 def _slope(name: str, other: str, line: tuple[float, float, float], table: dict, blamed: str) -> LogFinding:
     slope, intercept, correlation = line
     values = {"slope": slope, "intercept": intercept, "correlation": correlation}
@@ -191,8 +209,10 @@ def _slope(name: str, other: str, line: tuple[float, float, float], table: dict,
     if correlation < SCALED:
         message = f"{story}, not 1, and follows it loosely (correlation {correlation:.2f}): a damaged or late channel?"
         return LogFinding("warning", name, message, values)
-    if factors:
+    if factors and abs(intercept) < SHIFTED:
         nearest = min(factors, key=lambda factor: abs(np.log(slope / factor)))
         channel, unit = factors[nearest]
         return LogFinding("error", channel, f"{story}: {channel} looks like {unit}. Set it in the channel map.", values)
-    return LogFinding("warning", name, f"{story}, which should be 1: a wrong unit or scale in one of them?", values)
+    return LogFinding(
+        "warning", name, f"{story}, which should be 1: a wrong unit or scale, or a car that slides?", values
+    )
