@@ -546,20 +546,20 @@ def test_a_slope_that_is_loosely_followed_is_no_unit(sound):
 def spun(a_y_rate):
     """a_y and v_x yaw_rate of a car that slides, from the rate of its lateral speed."""
     time = np.arange(0.0, 40.0, STEP)
-    turn = 6.0 * np.sin(0.8 * time)
-    slides = np.clip((time - 20.0) / 2.0, 0.0, 1.0)
+    turn = 20.0 * np.sin(0.8 * time)
+    slides = np.clip((time - 10.0) / 2.0, 0.0, 1.0)
     return time, turn, turn - slides * a_y_rate(time, turn)
 
 
 @pytest.mark.parametrize(
     "a_y_rate",
-    [lambda t, turn: 0.6 * turn + 6.0, lambda t, turn: 0.55 * turn, lambda t, turn: 1.4 * turn],
+    [lambda t, turn: 0.6 * turn + 4.0, lambda t, turn: 0.55 * turn, lambda t, turn: 1.4 * turn],
     ids=["one turn", "slalom", "against the turn"],
 )
 def test_a_car_that_slides_has_no_wrong_unit_or_sign(a_y_rate):
-    """The first half is driven gently; in the second, v_x yaw_rate turns the car further than the tyres' force."""
+    """The first 9 s are driven gently; then v_x yaw_rate turns the car further than the tyres' force."""
     time, turn, a_y = spun(a_y_rate)
-    gently = np.where(time < 18.0, 0.35, 1.0)
+    gently = np.where(time < 9.0, 0.12, 1.0)
     rng = np.random.default_rng(2)
     noisy = lambda values, std: values + std * rng.normal(size=time.size)
     channels = {
@@ -570,5 +570,5 @@ def test_a_car_that_slides_has_no_wrong_unit_or_sign(a_y_rate):
     found = findings(time, channels, None)
     assert not [one for one in found if one.severity == "error"], found
     for wrong in ({"v_x": channels["v_x"] / 0.44704}, {"a_y": -channels["a_y"]}):
-        gentle = {name: values[: time.searchsorted(18.0)] for name, values in (channels | wrong).items()}
-        assert [one for one in findings(time[: time.searchsorted(18.0)], gentle, None) if one.severity == "error"]
+        gentle = {name: values[: time.searchsorted(9.0)] for name, values in (channels | wrong).items()}
+        assert [one for one in findings(time[: time.searchsorted(9.0)], gentle, None) if one.severity == "error"]
