@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -48,6 +49,11 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
                 f"{advice}."
             )
     return recording
+
+
+def with_fill_option(reason: str) -> str:
+    """The reason of a refusal, with the program's option that fills a gap instead of the library's function."""
+    return re.sub(r"Fill it with: recording\.fill\([^)]*\)\.", "Add --fill SECONDS, or raise it.", reason)
 
 
 class LogParts(NamedTuple):

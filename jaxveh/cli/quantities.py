@@ -12,6 +12,7 @@ import numpy as np
 from jaxveh import InputError, Recording, estimators, io
 from jaxveh._core.errors import check_one_of, check_positive
 from jaxveh._core.recording import TRUTH
+from jaxveh.cli.blanking import with_fill_option
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.drives import read_log
 from jaxveh.cli.missing_speed import with_speed
@@ -184,7 +185,7 @@ def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, seen: Record
     else:
         every = asked.methods is not None and set(asked.methods) == set(quantity.METHODS)
         methods = None if every else asked.methods or [quantity.RECOMMENDED]
-        compared = estimators.compare(car, seen, quantity, methods, smoothed=not asked.live)
+        compared = _compared(quantity, car, seen, methods, not asked.live)
     if asked.truth is None or asked.truth.removeprefix(TRUTH) not in quantity.SHOWN:
         return Shown(compared, {}, {})
     name = asked.truth.removeprefix(TRUTH)
@@ -199,9 +200,18 @@ def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, seen: Record
 def _recommended(quantity: ModuleType, car: CarSpecification, seen: Recording, smoothed: bool) -> Compared:
     """Run the recommended method, or record the reason why it cannot run."""
     try:
-        return estimators.compare(car, seen, quantity, [quantity.RECOMMENDED], smoothed=smoothed)
+        return _compared(quantity, car, seen, [quantity.RECOMMENDED], smoothed)
     except InputError as error:
         return Compared({}, {quantity.RECOMMENDED: str(error)}, {})
+
+
+def _compared(quantity: ModuleType, car: CarSpecification, seen: Recording, methods: Any, smoothed: bool) -> Compared:
+    """Run the methods (None: all); reasons of refusals name the option that helps."""
+    try:
+        found = estimators.compare(car, seen, quantity, methods, smoothed=smoothed)
+    except InputError as error:
+        raise InputError(with_fill_option(str(error))) from error
+    return found._replace(refused={name: with_fill_option(reason) for name, reason in found.refused.items()})
 
 
 def _conclude(asked: Asked, log: Path, product: Path, recording: Recording, found: dict[str, Shown]) -> dict[str, Any]:

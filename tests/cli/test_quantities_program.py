@@ -134,6 +134,17 @@ def test_the_file_with_every_key_has_every_key():
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("methods", ["open_loop", "open_loop,steady_turn"])
+def test_a_gap_is_told_with_the_option_that_fills_it(drive, methods):
+    log = io.read_recording(drive / "drive.csv")
+    steer = np.array(log["steer"])
+    steer[50:53] = np.nan
+    io.write_recording(log.replace(steer=steer), drive / "drive.csv", overwrite=True)
+    result = estimate(drive, "--what", "sideslip", "--methods", methods, "--anyway")
+    words = " ".join(result.output.split())
+    assert "Add --fill SECONDS" in words and "Fill it with" not in words, result.output
+
+
 def test_the_catalogue_is_what_the_methods_declare():
     """`python tests/cli/test_quantities_program.py` writes it anew."""
     assert CATALOGUE.read_text() == HEAD + estimators.kit.catalogue(QUANTITIES)
