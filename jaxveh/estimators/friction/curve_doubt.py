@@ -9,13 +9,14 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.friction.laws import LEAST_FRICTION, PlanarCar
+from jaxveh.estimators.friction.tyre_doubt import AbstractTyreDoubt
 from jaxveh.estimators.method import AbstractMethod
 
 SHARES = (0.0, 1.0)
 """Shares of the brush model's curve in the copies."""
 
 
-class CurveDoubt(AbstractMethod):
+class CurveDoubt(AbstractTyreDoubt):
     """Two copies of a method in parallel: with the file's curves, and with the brush model's of the same stiffness and peak.
 
     Below the peak, a curve that saturates late on a road with high friction and one that saturates early on a road with less have
@@ -28,18 +29,7 @@ class CurveDoubt(AbstractMethod):
     inner: AbstractMethod
     agree: jax.Array = positive("-", default=0.1)
 
-    @property
-    def needs(self):
-        return self.inner.needs
-
-    def first(self, t, values):
-        return self._together(jax.vmap(lambda share: self._with(share).first(t, values))(self._shares()))
-
-    def next(self, memory, t, values):
-        step = lambda share, memory: self._with(share).next(memory, t, values)
-        return self._together(jax.vmap(step)(self._shares(), memory))
-
-    def _shares(self):
+    def _tyres(self):
         return jnp.asarray(SHARES, self.agree.dtype)
 
     def _with(self, share) -> AbstractMethod:

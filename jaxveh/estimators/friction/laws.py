@@ -117,11 +117,6 @@ def planar_car(car: CarSpecification) -> PlanarCar:
     )  # fmt: skip
 
 
-def along_curve(curve: SimilarCurve, ratio: float = 1.2) -> SimilarCurve:
-    """The longitudinal curve of an axle from its lateral one: equal friction and shape, `ratio` times the stiffness."""
-    return SimilarCurve(ratio * curve.stiffness, curve.peak, curve.shape, curve.bend, curve.brush)
-
-
 def _curve(tyre, stiffness: float, load: float) -> SimilarCurve:
     ordinary = tyres.GENERIC_TYRE
     if tyre is None:

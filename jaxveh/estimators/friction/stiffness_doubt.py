@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.friction.laws import PlanarCar
+from jaxveh.estimators.friction.tyre_doubt import AbstractTyreDoubt
 from jaxveh.estimators.method import AbstractMethod, Answer
 from jaxveh.tyres import LuGre
 
@@ -19,7 +20,7 @@ LEAST = 1e-3
 """Lower limit of a friction before its logarithm is taken."""
 
 
-class StiffnessDoubt(AbstractMethod):
+class StiffnessDoubt(AbstractTyreDoubt):
     """Five copies of a method in parallel: with the file's stiffnesses, and with those of front and rear smaller or larger by the
     `spread` (-) of their logarithms.
 
@@ -33,18 +34,7 @@ class StiffnessDoubt(AbstractMethod):
     spread: jax.Array = positive("-", default=0.2)
     widest: jax.Array = positive("-", default=0.15)
 
-    @property
-    def needs(self):
-        return self.inner.needs
-
-    def first(self, t, values):
-        return self._together(jax.vmap(lambda factor: self._with(factor).first(t, values))(self._factors()))
-
-    def next(self, memory, t, values):
-        step = lambda factor, memory: self._with(factor).next(memory, t, values)
-        return self._together(jax.vmap(step)(self._factors(), memory))
-
-    def _factors(self):
+    def _tyres(self):
         """Factors of front and rear stiffness, (5, 2)."""
         signs = ((0.0, 0.0), (1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0))
         return jnp.exp(self.spread * jnp.asarray(signs, self.spread.dtype))
