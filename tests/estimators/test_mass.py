@@ -49,6 +49,23 @@ def test_a_grade_is_no_mass_to_what_is_fast():
     np.testing.assert_allclose(two[0], two[1], rtol=0.01)
 
 
+WITHOUT_THE_TORQUES_ERROR = ("joint", "forgetting")
+"""The filter of `mass_and_grade` shows its own state; the observer gives no standard deviation."""
+
+
+@pytest.mark.parametrize("name", [name for name in EVERY if name not in WITHOUT_THE_TORQUES_ERROR])
+@pytest.mark.parametrize("gain", [0.95, 1.05])
+def test_the_standard_deviation_contains_torques_that_are_wrong_in_all_rows(name, gain):
+    method = mass.METHODS[name].make(LIGHT)
+    log = pushed(method.needs, mass=1500.0, rows=6000)
+    torques = {torque: gain * np.asarray(log[torque]) for torque in ("drive_torque", "brake_torque")}
+    found = mass.estimate(method, log.replace(**torques))
+    assert found.known.mass[-1]
+    assert 0.03 * found["mass"][-1] < found.std.mass[-1] < 0.05 * found["mass"][-1]
+    assert abs(found["mass"][-1] / 1500.0 - 1.0) > 0.02
+    assert abs(found["mass"][-1] - 1500.0) < 2.0 * found.std.mass[-1]
+
+
 def test_a_file_without_the_wheels_radius_is_refused():
     for name in EVERY:
         with pytest.raises(InputError, match=r"wheel_radius \(m\)"):
