@@ -84,11 +84,15 @@ def simulate(
 
     **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened as the fastest motion
     requires (wheel spins at low speed, a sensor's low-pass, the driver), or Kvaerno's implicit method where the steps would be
-    too short. "explicit" and "implicit" are always obeyed; a warning says where equal steps were too long for the motion. A
-    diffrax solver takes equal steps, or its own with a `stepsize_controller`. Under jit, vmap or grad values cannot be checked:
-    "auto" is then "explicit". `adjoint`: diffrax's way to differentiate; the default serves reverse mode, and also forward mode
-    with equal steps and no event (otherwise `diffrax.ForwardMode()`). `progress` gets the share done (single runs). All of it may
-    be jitted, vmapped over keys, cars and manoeuvres, and differentiated by any of their leaves.
+    too short. Under jit, vmap or grad the fastest motion is not known. For a car whose wheels turn, or sensors with a low-pass,
+    "auto" is then `statespace.StabilisedRK4`, which holds the spins of every car of this package at standstill, brakes applied
+    (poles up to 18 / `max_step`; above 5 m/s "explicit" is enough, in half the time). For every other car it is RK4. "explicit"
+    (RK4) and "implicit" are always obeyed; outside jit a warning says where equal steps were too long for the motion. A diffrax
+    solver takes equal steps, or its own with a `stepsize_controller`.
+
+    `adjoint`: diffrax's way to differentiate; the default serves reverse mode, and also forward mode with equal steps and no
+    event (otherwise `diffrax.ForwardMode()`). `progress` gets the share done (single runs). All of it may be jitted, vmapped over
+    keys, cars and manoeuvres, and differentiated by any of their leaves.
 
     **Raises** `InputError` for arguments out of range, sensors or an event of a wrong type, a manoeuvre without an input that the
     car needs, rows that coincide in the car's dtype; `FilterError`, with time, state and a remedy, if the motion does not stay
@@ -196,10 +200,11 @@ def _choice(solver, controller, max_step) -> SolverChoice | None:
 
 def _run(driven: Driven, values: dict, run, asked: SolverChoice | None, times: np.ndarray, max_step: float) -> Solution:
     """Run as asked; on "auto" check the fastest motion before and after, and run again where steps were too long."""
-    looks = is_concrete(driven, values) and stiffness.may_be_stiff(driven, max_step)
+    known = is_concrete(driven, values)
+    looks = known and stiffness.may_be_stiff(driven, max_step)
     if asked is not None or not looks:
-        choice = stiffness.explicit(max_step) if asked is None else asked
-        found = run(choice)
+        unasked = stiffness.explicit(max_step) if known else stiffness.unseen(driven, max_step)
+        found = run(choice := unasked if asked is None else asked)
         if looks and choice.controller is None:
             _warn_of_long_steps(driven, found, choice, times)
         return found

@@ -15,13 +15,16 @@ from jax.flatten_util import ravel_pytree
 
 from jaxveh.sensors import Instrumented
 from jaxveh.simulation.driven import Driven, DrivenState, dtype_of
-from jaxveh.statespace import RolledRK4
+from jaxveh.statespace import Heun, RolledRK4, StabilisedRK4
 
 STABLE = 2.5
 """Step times fastest pole up to which RK4 decays with it; its limit is 2.79 on the real and 2.83 on the imaginary axis."""
 
 LIMIT = 2.75
 """Step times fastest pole beyond which RK4 grows or rings."""
+
+STABILISED, STABILISED_LIMIT = 16.5, 17.8
+"""The same two for `StabilisedRK4`, whose limit is 18.2 on the real axis, for the real poles of spins."""
 
 LEAST_STEP = 2.5e-4
 """s: for shorter steps an implicit solver is cheaper."""
@@ -54,7 +57,9 @@ def limits(solver: Any) -> tuple[float, float]:
     """
     if isinstance(solver, diffrax.AbstractImplicitSolver):
         return math.inf, math.inf
-    few = isinstance(solver, diffrax.Euler | diffrax.Heun | diffrax.Midpoint | diffrax.Ralston)
+    if isinstance(solver, StabilisedRK4):
+        return STABILISED_LIMIT, STABILISED
+    few = isinstance(solver, Heun | diffrax.Euler | diffrax.Heun | diffrax.Midpoint | diffrax.Ralston)
     return (2.0, 1.8) if few else (LIMIT, STABLE)
 
 
@@ -113,11 +118,15 @@ def sensors_pole(driven: Driven) -> Any:
     return 0.0 if sensors is None or sensors.low_pass is None else sensors.low_pass.omega
 
 
+def has_fast_states(driven: Driven) -> bool:
+    """Whether the car has states whose names do not show that they are slow: spins, wheel travels, tyre deflections."""
+    return not set(driven.car.vehicle.state_type._fields) <= SLOW
+
+
 def may_be_stiff(driven: Driven, max_step: float) -> bool:
-    """Whether steps of `max_step` (s) may be too long: the car has states whose names do not show that they are slow enough, or
-    its sensors or its driver are fast."""
+    """Whether steps of `max_step` (s) may be too long for RK4: the car has fast states, or its sensors or its driver are fast."""
     rate = driven.driver.fastest_rate
-    if rate is None or not set(driven.car.vehicle.state_type._fields) <= SLOW:
+    if rate is None or has_fast_states(driven):
         return True
     # The driver's rate is approximate, and includes the response of the car.
     known = max(SLOW_POLE, float(np.max(sensors_pole(driven))), 2.0 * float(np.max(rate)))
@@ -174,6 +183,14 @@ def worst(driven: Driven, times: np.ndarray, x: Any, u: Any) -> tuple[float, flo
 def explicit(max_step: float) -> SolverChoice:
     """RK4 with equal steps."""
     return SolverChoice(RolledRK4(), None, max_step)
+
+
+def unseen(driven: Driven, max_step: float) -> SolverChoice:
+    """The choice where the numbers are not known, under jit, vmap or grad: the stabilised method if anything may be fast."""
+    sensors = driven.car.sensors
+    filtered = sensors is not None and sensors.low_pass is not None
+    fast = has_fast_states(driven) or filtered or driven.driver.fastest_rate is None
+    return SolverChoice(StabilisedRK4(), None, max_step) if fast else explicit(max_step)
 
 
 def implicit(max_step: float, rtol: float = 1e-6, atol: float = 1e-7) -> SolverChoice:

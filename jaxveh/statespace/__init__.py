@@ -27,6 +27,7 @@ from jaxveh.statespace.noise import (
 from jaxveh.statespace.parameters import parameters_of, put_parameters, start_from, with_parameters
 from jaxveh.statespace.process import AbstractProcessNoise, Continuous, Discrete
 from jaxveh.statespace.solvers import RK4, Heun, Propagate, RolledRK4
+from jaxveh.statespace.stabilised import StabilisedRK4
 from jaxveh.statespace.uncertain_inputs import uncertain_inputs
 
 __all__ = [
@@ -58,6 +59,7 @@ __all__ = [
     "RolledRK4",
     "Row",
     "Smoothing",
+    "StabilisedRK4",
     "StateDependent",
     "StateSpace",
     "StudentT",

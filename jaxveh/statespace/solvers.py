@@ -113,7 +113,7 @@ class Heun(AbstractOneStep):
         return numerics.fence(jax.tree.map(lambda y, a, b: y + 0.5 * (a + b), y0, k1, k2))
 
 
-EXPLICIT = (RK4, RolledRK4, Heun, diffrax.AbstractERK, diffrax.Euler)
+EXPLICIT = (AbstractOneStep, diffrax.AbstractERK, diffrax.Euler)
 """Explicit solvers, the package's own and those of diffrax."""
 
 
