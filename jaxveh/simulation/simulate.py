@@ -203,7 +203,7 @@ def _run(driven: Driven, values: dict, run, asked: SolverChoice | None, times: n
     known = is_concrete(driven, values)
     looks = known and stiffness.may_be_stiff(driven, max_step)
     if asked is not None or not looks:
-        unasked = stiffness.explicit(max_step) if known else stiffness.unseen(driven, max_step)
+        unasked = stiffness.explicit(max_step) if known else stiffness.blind_choice(driven, max_step)
         found = run(choice := unasked if asked is None else asked)
         if looks and choice.controller is None:
             _warn_of_long_steps(driven, found, choice, times)

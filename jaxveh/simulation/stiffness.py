@@ -185,7 +185,7 @@ def explicit(max_step: float) -> SolverChoice:
     return SolverChoice(RolledRK4(), None, max_step)
 
 
-def unseen(driven: Driven, max_step: float) -> SolverChoice:
+def blind_choice(driven: Driven, max_step: float) -> SolverChoice:
     """The choice where the numbers are not known, under jit, vmap or grad: the stabilised method if anything may be fast."""
     sensors = driven.car.sensors
     filtered = sensors is not None and sensors.low_pass is not None

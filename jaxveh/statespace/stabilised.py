@@ -37,9 +37,9 @@ def abscissae() -> np.ndarray:
 class StabilisedRK4(AbstractOneStep):
     """An eight-stage method of fourth order whose steps decay with poles on the negative real axis up to 18.2 / step.
 
-    RK4 holds up to 2.8 / step. It is for cars whose wheels turn: near standstill a spin decays within 0.2 ms, while little else is
-    faster than 10 ms. On the imaginary axis it holds up to 3.7 / step, beside the real axis up to 10 / step (10 degrees) and 5 /
-    step (30 degrees). A step takes twice as long as one of RK4, and its leading errors are a quarter as large.
+    RK4 holds up to 2.8 / step. This one is for cars whose wheels turn: near standstill a spin decays within 0.2 ms, while little
+    else is faster than 10 ms. On the imaginary axis it holds up to 3.7 / step, 10 degrees beside the real axis up to 10 / step,
+    30 degrees up to 5 / step. A step takes twice as long as one of RK4, and its leading errors are a quarter as large.
 
     Stages in two registers (J. Williamson, J. Comput. Phys. 35, 1980): dy <- A_i dy + h f(t + c_i h, y); y <- y + B_i dy. The
     coefficients are our own. They solve the eight conditions of fourth order, and give the stability polynomial with the longest

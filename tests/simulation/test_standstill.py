@@ -46,7 +46,9 @@ def unseen():
     @jax.jit
     def both(car, inertia):
         braked = simulate(car, BRAKES)
-        return {name: braked[name] for name in ("true.v_x", "true.a_x", "true.slip_ratio_fl")}, jax.value_and_grad(crawl)(inertia)
+        return {name: braked[name] for name in ("true.v_x", "true.a_x", "true.slip_ratio_fl")}, jax.value_and_grad(
+            crawl
+        )(inertia)
 
     return both
 
