@@ -84,11 +84,11 @@ def simulate(
 
     **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened as the fastest motion
     requires (wheel spins at low speed, a sensor's low-pass, the driver), or Kvaerno's implicit method where the steps would be
-    too short. Under jit, vmap or grad the fastest motion is not known. For a car whose wheels turn, or sensors with a low-pass,
-    "auto" is then `statespace.StabilisedRK4`, which holds the spins of every car of this package at standstill, brakes applied
-    (poles up to 18 / `max_step`; above 5 m/s "explicit" is enough, in half the time). For every other car it is RK4. "explicit"
-    (RK4) and "implicit" are always obeyed; outside jit a warning says where equal steps were too long for the motion. A diffrax
-    solver takes equal steps, or its own with a `stepsize_controller`.
+    too short. Under jit, vmap or grad the fastest motion is not known: "auto" then takes `statespace.StabilisedRK4`, with steps
+    that hold whatever a car of this kind can do, at standstill too (for a car whose wheels turn at most 2 ms), and RK4 only where
+    it holds that as well. "explicit" (RK4) and "implicit" are always obeyed: for a car with wheels above 5 m/s "explicit" is
+    enough, and twice as fast. Outside jit a warning says where equal steps were too long for the motion. A diffrax solver takes
+    equal steps, or its own with a `stepsize_controller`.
 
     `adjoint`: diffrax's way to differentiate; the default serves reverse mode, and also forward mode with equal steps and no
     event (otherwise `diffrax.ForwardMode()`). `progress` gets the share done (single runs). All of it may be jitted, vmapped over

@@ -69,13 +69,13 @@ def test_slopes_of_a_crawl_are_those_of_differences(unseen):
 
 @pytest.mark.full
 @pytest.mark.parametrize("fidelity", [name for name in vehicles.sets.FIDELITIES if name != "kinematic-trailer"])
-@pytest.mark.parametrize("speed", [0.2, 2.0])
-def test_every_car_crawls_where_no_number_is_known(fidelity, speed):
+@pytest.mark.parametrize(("speed", "max_step"), [(0.2, 0.002), (2.0, 0.002), (0.6, 0.05)])
+def test_every_car_crawls_where_no_number_is_known(fidelity, speed, max_step):
     car = vehicles.named_car("van", fidelity)
     slow = manoeuvres.step_steer(speed, 0.05, start=0.1, duration=0.5)
-    unseen = eqx.filter_jit(lambda car: simulate(car, slow, dt=0.05).channels)(car)
+    unseen = eqx.filter_jit(lambda car: simulate(car, slow, dt=0.05, max_step=max_step).channels)(car)
     fine = simulate(car, slow, dt=0.05, solver="explicit", max_step=2e-4).channels
     assert set(unseen) == set(fine)
     for name in ("true.v_x", "true.yaw_rate", "true.a_x", "true.a_y"):
         if name in fine:
-            np.testing.assert_allclose(unseen[name], fine[name], atol=1e-3 if ".a_" in name else 1e-5, err_msg=name)
+            np.testing.assert_allclose(unseen[name], fine[name], atol=2e-3 if ".a_" in name else 1e-5, err_msg=name)

@@ -109,3 +109,19 @@ def test_where_no_steps_hold_the_implicit_method_is_the_last_word(monkeypatch):
     simulate(linear(), STEER, dt=0.1)
     np.testing.assert_allclose([one.max_step for one in taken[:-1]], [0.002, 1.25e-3, 6.25e-4])
     assert len(taken) == 4 and taken[-1].controller is not None
+
+
+@pytest.mark.parametrize("what", ["long steps", "low-pass"])
+def test_where_no_number_is_known_every_step_holds(what):
+    """Under jit: long steps of a crawling car, and a sensor that is faster than the steps of RK4."""
+    if what == "long steps":
+        drive, sensor, channel = manoeuvres.step_steer(0.6, 0.05, start=0.1, duration=1.0), None, "true.a_y"
+        options, step = {"dt": 0.1}, {"max_step": 0.05}
+    else:
+        drive, sensor, channel = STEER, sensors.esc(low_pass=sensors.LowPass(300.0)), "a_y"
+        options, step = {}, {}
+    fine = simulate(linear(), drive, sensor, max_step=2e-4, **options)[channel]
+    blind = jax.jit(lambda car: simulate(car, drive, sensor, **options, **step)[channel])
+    assert peak(blind(linear()) - fine) < 0.002 * peak(fine)
+    told = jax.jit(lambda car: simulate(car, drive, sensor, solver="explicit", **options, **step)[channel])
+    assert not peak(told(linear()) - fine) < 0.1 * peak(fine)
