@@ -48,7 +48,7 @@ SLOW_POLE = 1000.0
 """1/s: several hundred at walking speed, with a margin."""
 
 FAST_POLE = 8000.0
-"""1/s: the same of the other states. The spins of the package's cars have at most 5500 at standstill, 7100 if they brake fully."""
+"""1/s: the same of the other states. Spins of the package's cars have at most 5500 at standstill, 7100 when they brake fully."""
 
 
 def limits(solver: Any) -> tuple[float, float]:
