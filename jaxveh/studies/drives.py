@@ -85,6 +85,4 @@ def sensors_of(told: Mapping[str, Any], car: Any) -> Any:
 
 def simulate(drive: Drive, key: jax.Array) -> Recording:
     """The recording, with the truth beside it; a drive that fails contains NaN."""
-    return simulation.simulate(
-        drive.car, drive.driver, drive.sensors, key, road=drive.road, dt=drive.dt, solver="explicit", throw=False
-    )
+    return simulation.simulate(drive.car, drive.driver, drive.sensors, key, road=drive.road, dt=drive.dt, throw=False)
