@@ -83,12 +83,13 @@ def simulate(
     both cases every output of the car as truth, `true.<name>`. `key` draws all randomness; without a key there is none.
 
     **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened as the fastest motion
-    requires (wheel spins at low speed, a sensor's low-pass, the driver), or Kvaerno's implicit method where the steps would be
-    too short. Under jit, vmap or grad the fastest motion is not known: "auto" then takes `statespace.StabilisedRK4`, with steps
-    that hold whatever a car of this kind can do, at standstill too (for a car whose wheels turn at most 2 ms), and RK4 only where
-    it holds that as well. "explicit" (RK4) and "implicit" are always obeyed: for a car with wheels above 5 m/s "explicit" is
-    enough, and twice as fast. Outside jit a warning says where equal steps were too long for the motion. A diffrax solver takes
-    equal steps, or its own with a `stepsize_controller`.
+    requires (a sensor's low-pass, the driver, a crawl). For a car whose wheels turn it takes `statespace.StabilisedRK4`, whose
+    steps of at most 2 ms hold the wheels' spins to standstill. Where steps would be too short, it takes Kvaerno's implicit
+    method. Under jit, vmap or grad the fastest motion is not known: the stabilised method then holds whatever this kind of car
+    can do.
+    "explicit" (RK4) and "implicit" are always obeyed: above 5 m/s "explicit" is enough for a car whose wheels turn, and twice as
+    fast. Outside jit a warning says where equal steps were too long for the motion. A diffrax solver takes equal steps, or its
+    own with a `stepsize_controller`.
 
     `adjoint`: diffrax's way to differentiate; the default serves reverse mode, and also forward mode with equal steps and no
     event (otherwise `diffrax.ForwardMode()`). `progress` gets the share done (single runs). All of it may be jitted, vmapped over
@@ -208,15 +209,15 @@ def _run(driven: Driven, values: dict, run, asked: SolverChoice | None, times: n
         if looks and choice.controller is None:
             _warn_of_long_steps(driven, found, choice, times)
         return found
-    choice = stiffness.choose(stiffness.at_start(driven, values, times), max_step)
+    choice = stiffness.first_choice(driven, values, times, max_step)
     for _ in range(ROUNDS):
         found = run(choice)
         if choice.controller is not None:
             return found
         pole, _ = stiffness.worst(driven, times, found.x, found.u)
-        if not pole * choice.max_step > stiffness.LIMIT:
+        if not pole * choice.max_step > stiffness.limits(choice.solver)[0]:
             return found
-        choice = stiffness.choose(pole, max_step)
+        choice = stiffness.next_choice(choice, pole, max_step)
     # Shorter and shorter steps have shown faster and faster motions: there is no better guess.
     return run(stiffness.implicit(max_step))
 

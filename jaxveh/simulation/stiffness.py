@@ -189,7 +189,7 @@ def explicit(max_step: float) -> SolverChoice:
 
 
 def blind_choice(driven: Driven, max_step: float) -> SolverChoice:
-    """The choice where the numbers are not known, under jit, vmap or grad: what holds the fastest motion that the kind of car can
+    """The choice where no number is known, as under jit, vmap or grad: it holds the fastest motion that this kind of car can
     have, with steps of at most `max_step` (s)."""
     pole = FAST_POLE if has_fast_states(driven) else SLOW_POLE
     sensors = driven.car.sensors
@@ -202,6 +202,21 @@ def blind_choice(driven: Driven, max_step: float) -> SolverChoice:
 def implicit(max_step: float, rtol: float = 1e-6, atol: float = 1e-7) -> SolverChoice:
     """Kvaerno's stiff method of fifth order (2004) with adaptive steps."""
     return SolverChoice(diffrax.Kvaerno5(), diffrax.PIDController(rtol=rtol, atol=atol, dtmax=0.05), max_step)
+
+
+def first_choice(driven: Driven, values: dict, times: np.ndarray, max_step: float) -> SolverChoice:
+    """The choice for known numbers. For a car whose wheels turn it is the blind one: a drive to standstill then needs one
+    program, where RK4, chosen by the start, would need another with shorter steps. For every other car the start decides."""
+    if has_fast_states(driven) and not float(np.max(sensors_pole(driven))) * max_step > LIMIT:
+        return blind_choice(driven, max_step)
+    return choose(at_start(driven, values, times), max_step)
+
+
+def next_choice(choice: SolverChoice, pole: float, max_step: float) -> SolverChoice:
+    """The choice after one whose steps were too long for the fastest pole (1/s) of its result."""
+    if isinstance(choice.solver, StabilisedRK4) and (step := STABILISED / pole) >= 2.0 * LEAST_STEP:
+        return SolverChoice(choice.solver, None, min(max_step, step))
+    return choose(pole, max_step)
 
 
 def choose(pole: float, max_step: float) -> SolverChoice:
