@@ -24,10 +24,12 @@ from jaxveh.statespace import (
     MeasurementNoise,
     Prior,
     Propagate,
+    StabilisedRK4,
     StateSpace,
     with_parameters,
 )
 from jaxveh.vehicles import AbstractVehicle
+from jaxveh.vehicles.kit import has_fast_states
 
 TOLD_SPEED = "v_x"
 """The speed: an input of some cars, and a state of others."""
@@ -67,14 +69,16 @@ def state_space(
     - `process_noise`: standard deviations by state in unit per root second (default `PROCESS_NOISE`, for the states the
       car has), or a `Continuous` or `Discrete` law. `start`, `start_spread`: mean and standard deviation of the start state.
     - A car whose speed is a state (`SevenDOF`, `TwoTrack3DOF`, ... under torques) needs `start={"v_x": ...}` (m/s), the speed
-      in the first row, and starts straight ahead with rolling wheels. Its wheel spins are stiff: with rows 0.01 s apart, one
-      step suffices at 20 m/s; lower speeds or longer intervals need more `steps`, see the poles in the car's docstring.
+      in the first row, and starts straight ahead with rolling wheels. If its wheels turn, their spins decay fast: with rows
+      0.01 s apart one step of `statespace.StabilisedRK4` suffices from 3 m/s on; lower speeds or longer intervals need more
+      `steps` (4 hold standstill).
     - `measurement_noise`: another noise law than the sensors' own (say, a `StateDependent` one that grows with slip).
     - `minimum_speed` (m/s): below it all states of a car whose speed is the input `v_x` are held (`held_rows` returns where): a
       single track has no steady slip angle at standstill. The states of a car whose speed is a state are never held.
     - `report`: outputs of the car to show in addition to its states, such as `sideslip`, `F_yf`, `slip_angle_front`; by default
       the sideslip of a car that has one.
-    - `solver`, `steps`: fixed steps between two rows; `input_path`: inputs `held` over a step or `linear`.
+    - `solver`, `steps`: fixed steps between two rows, by default one of `statespace.RK4`, or of `statespace.StabilisedRK4` if the
+      car's wheels turn; `input_path`: inputs `held` over a step or `linear`.
     - A measured `yaw` or `course` may be given modulo a whole turn (within -pi to pi): their innovations wrap.
 
     The estimate's fields are the states, then `report`, then the parameters (`front_B`), in physical units.
@@ -86,7 +90,8 @@ def state_space(
     _check_kinds(car, sensors, estimate)
     system = Instrumented(strong(car), _without_noise(sensors))
     states = system.state_type._fields
-    transition = Propagate(_derivatives, solver or RK4(), steps)
+    usual = StabilisedRK4() if has_fast_states(car) else RK4()
+    transition = Propagate(_derivatives, solver or usual, steps)
     model = StateSpace(
         system=system,
         transition=HeldBelow(transition, minimum_speed) if TOLD_SPEED in system.inputs else transition,

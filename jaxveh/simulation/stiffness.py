@@ -16,6 +16,7 @@ from jax.flatten_util import ravel_pytree
 from jaxveh.sensors import Instrumented
 from jaxveh.simulation.driven import Driven, DrivenState, dtype_of
 from jaxveh.statespace import Heun, RolledRK4, StabilisedRK4
+from jaxveh.vehicles.kit import has_fast_states
 
 STABLE = 2.5
 """Step times fastest pole up to which RK4 decays with it; its limit is 2.79 on the real and 2.83 on the imaginary axis."""
@@ -38,14 +39,8 @@ LOOKS = 16
 """Number of rows of a simulation that are checked."""
 
 
-SLOW = {
-    *("x", "y", "z", "yaw", "roll", "pitch", "v_x", "v_y", "v_z", "yaw_rate", "roll_rate", "pitch_rate", "sideslip"),
-    *("a_x_felt", "a_y_felt", "steer", "speed", "hitch"),
-}
-"""States whose poles stay below `SLOW_POLE` in any car; those of spins, wheel travels and tyre deflections may be faster."""
-
 SLOW_POLE = 1000.0
-"""1/s: several hundred at walking speed, with a margin."""
+"""1/s: of slow states, several hundred at walking speed, with a margin."""
 
 FAST_POLE = 8000.0
 """1/s: the same of the other states. Spins of the package's cars have at most 5500 at standstill, 7100 when they brake fully."""
@@ -121,15 +116,10 @@ def sensors_pole(driven: Driven) -> Any:
     return 0.0 if sensors is None or sensors.low_pass is None else sensors.low_pass.omega
 
 
-def has_fast_states(driven: Driven) -> bool:
-    """Whether the car has states whose names do not show that they are slow: spins, wheel travels, tyre deflections."""
-    return not set(driven.car.vehicle.state_type._fields) <= SLOW
-
-
 def may_be_stiff(driven: Driven, max_step: float) -> bool:
     """Whether steps of `max_step` (s) may be too long for RK4: the car has fast states, or its sensors or its driver are fast."""
     rate = driven.driver.fastest_rate
-    if rate is None or has_fast_states(driven):
+    if rate is None or has_fast_states(driven.car.vehicle):
         return True
     # The driver's rate is approximate, and includes the response of the car.
     known = max(SLOW_POLE, float(np.max(sensors_pole(driven))), 2.0 * float(np.max(rate)))
@@ -191,7 +181,7 @@ def explicit(max_step: float) -> SolverChoice:
 def blind_choice(driven: Driven, max_step: float) -> SolverChoice:
     """The choice where no number is known, as under jit, vmap or grad: it holds the fastest motion that this kind of car can
     have, with steps of at most `max_step` (s)."""
-    pole = FAST_POLE if has_fast_states(driven) else SLOW_POLE
+    pole = FAST_POLE if has_fast_states(driven.car.vehicle) else SLOW_POLE
     sensors = driven.car.sensors
     filtered = sensors is not None and sensors.low_pass is not None
     if pole * max_step <= LIMIT and not filtered and driven.driver.fastest_rate is not None:
@@ -207,7 +197,7 @@ def implicit(max_step: float, rtol: float = 1e-6, atol: float = 1e-7) -> SolverC
 def first_choice(driven: Driven, values: dict, times: np.ndarray, max_step: float) -> SolverChoice:
     """The choice for known numbers. For a car whose wheels turn it is the blind one: a drive to standstill then needs one
     program, where RK4, chosen by the start, would need another with shorter steps. For every other car the start decides."""
-    if has_fast_states(driven) and not float(np.max(sensors_pole(driven))) * max_step > LIMIT:
+    if has_fast_states(driven.car.vehicle) and not float(np.max(sensors_pole(driven))) * max_step > LIMIT:
         return blind_choice(driven, max_step)
     return choose(at_start(driven, values, times), max_step)
 

@@ -2,6 +2,7 @@
 
 from jaxveh.vehicles.base import with_batch_shape
 from jaxveh.vehicles.drive import AbstractDriven
+from jaxveh.vehicles.fast_states import has_fast_states
 from jaxveh.vehicles.given_speed import AbstractToldSpeed
 from jaxveh.vehicles.load_transfer import AbstractShiftingLoads, planar_loads
 from jaxveh.vehicles.rolling_body import AbstractRollingTwoTrack
@@ -44,6 +45,7 @@ __all__ = [
     "body_forces",
     "corners",
     "each_wheel",
+    "has_fast_states",
     "planar_loads",
     "rolling_wheels",
     "travel_direction",

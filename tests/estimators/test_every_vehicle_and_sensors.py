@@ -16,7 +16,7 @@ import pytest
 
 from jaxveh import InputError, Recording, estimators, filters, sensors, tyres, vehicles
 from jaxveh._core.names import record
-from jaxveh.statespace import Gaussian, Heun, StateDependent
+from jaxveh.statespace import Gaussian, Heun, RolledRK4, StateDependent
 
 
 def named(fidelity):
@@ -190,3 +190,34 @@ def test_a_sensor_that_is_worse_in_slip():
     np.testing.assert_allclose(law.std.yaw_rate, 0.005 + 0.1 * 0.05, rtol=1e-2)
     with pytest.raises(InputError, match="measurement_noise is of yaw_rate: must be of the sensors' channels"):
         estimators.state_space(car, sensors.esc(), measurement_noise=Gaussian({"yaw_rate": 0.1}))
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name == "seven-dof" else pytest.mark.full) for name in CARS]
+)
+def test_the_usual_step_from_row_to_row_holds_from_four_metres_per_second_on(name):
+    """It ends where many short steps end, also if a state is off its balance."""
+    car = CARS[name]()
+    told = "v_x" in car.inputs
+    suite = SENSORS["esc"] if name not in ("longitudinal", "kinematic", "kinematic-trailer") else SENSORS["speed"]
+    usual, fine = (
+        estimators.state_space(car, suite, start=start_of(car), minimum_speed=0.0, **options)
+        for options in ({}, {"solver": RolledRK4()})
+    )
+
+    @jax.jit
+    def ends(speed):
+        u = record("Inputs", {n: jnp.asarray(0.0) for n in usual.inputs} | ({"v_x": speed} if told else {}))
+        u = u._replace(steer=0.05) if "steer" in u._fields else u
+        rolling = car.start(0.0, u, **({} if told else {"v_x": speed}))
+        off = jax.tree.map(lambda leaf: 1.02 * leaf + 0.002, rolling)
+        mean = usual.prior.mean._replace(**off._asdict())
+        short = lambda i, x: fine.transition(0.01 * i / 60, 0.01 * (i + 1) / 60, x, u)
+        return usual.transition(0.0, 0.01, mean, u), jax.lax.fori_loop(0, 60, short, mean)
+
+    for speed in (4.0, 25.0):
+        one, many = ends(speed)
+        for field in one._fields:
+            found, expected = float(getattr(one, field)), float(getattr(many, field))
+            near = 4e-3 if field.startswith("a_") else 2e-3
+            assert found == pytest.approx(expected, rel=0.02, abs=near), (speed, field)
