@@ -88,6 +88,17 @@ def check_whole(name: str, value, least: int = 1, advice: str = "") -> None:
         )
 
 
+LARGEST_SEED = 2**63 - 1
+"""The largest seed that jax takes."""
+
+
+def check_seed(name: str, value) -> None:
+    """Raise `InputError` unless `value` is a whole number from 0 to `LARGEST_SEED`."""
+    check_whole(name, value, 0)
+    if value > LARGEST_SEED:
+        raise InputError(f"{name} = {value}: must be at most {LARGEST_SEED}, 2^63 - 1.")
+
+
 def check_one_of(name: str, value, allowed) -> None:
     """Raise `InputError` unless `value` is one of `allowed`; the message suggests the most similar one."""
     if value not in tuple(allowed):

@@ -11,6 +11,7 @@ import jax
 from jaxveh import InputError, manoeuvres
 from jaxveh._core.errors import check_one_of, did_you_mean
 from jaxveh.manoeuvres import MANOEUVRES, USUAL, Course, manoeuvre_options, options_of_car
+from jaxveh.manoeuvres.base import check_speed, check_steer_deg
 
 NOT_SET = {"speed": "--speed", "to_speed": "--speed", "steer": "--steer-deg", "duration": "--duration", "key": "--seed"}
 """Settings that have a command-line option of their own."""
@@ -30,9 +31,13 @@ def parse_manoeuvre(
 ) -> AskedManoeuvre:
     """Return the manoeuvre of a name with its `name=value` settings and its options from the car; None means the usual value.
 
-    Raises `InputError` for an unknown manoeuvre or setting, and for a setting that is not a number.
+    Raises `InputError` for an unknown manoeuvre or setting, a setting that is not a number, and a
+    speed or steer out of range.
     """
     check_one_of("--manoeuvre", name, MANOEUVRES)
+    # In the units of the options: the manoeuvre itself would tell of rad.
+    check_speed("--speed", speed)
+    check_steer_deg("--steer-deg", steer_deg)
     usual_speed, usual_steer = USUAL[name]
     options = {**options_of_car(name, car), **_settings(name, settings)}
     if duration is not None:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from jaxveh import InputError
+from jaxveh._core.errors import LARGEST_SEED
 from jaxveh.diagnostics import kit
 
 LOG_HELP = (
@@ -41,7 +42,10 @@ Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write fi
 Force = Annotated[bool, typer.Option("--force", help="Let -o replace an existing file.")]
 
 Seed = Annotated[
-    int, typer.Option("--seed", help="Seed of the random numbers; the same seed gives the same result.", min=0)
+    int,
+    typer.Option(
+        "--seed", help="Seed of the random numbers; the same seed gives the same result.", min=0, max=LARGEST_SEED
+    ),
 ]
 
 Calibrate = Annotated[

@@ -48,7 +48,9 @@ def check_sampling(log: LogView) -> list[LogFinding]:
 
 def _raster(label: str, time: np.ndarray, missing: float) -> list[LogFinding]:
     if time.size < 3:
-        return [LogFinding("error", label, f"has only {time.size} sample(s).", {"count": time.size})]
+        return [
+            LogFinding("error", label, f"has only {time.size} sample(s): at least 3 are needed.", {"count": time.size})
+        ]
     steps = np.diff(time)
     usual = float(np.median(steps))
     if not QUICKEST <= usual < SLOWEST:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import ChannelMap
-from jaxveh.io.csv_layout import Layout, find_layout
+from jaxveh.io.csv_layout import BLANKS, Layout, find_layout
 from jaxveh.io.log import TableLog
 from jaxveh.io.optional import require
 from jaxveh.io.units import is_unit, same_unit
@@ -51,6 +51,7 @@ def read_columns(path: Path, told: ChannelMap | None = None) -> TextTable:
     if layout.remarks:
         warnings.warn(f"{path}: {'; '.join(layout.remarks)}.", JaxvehWarning, stacklevel=2)
     headings = _named(layout.headings, frame)
+    _tell_short_rows(path, layout, headings, frame, "strict")
     return TextTable(headings, _cells(headings, frame), layout.units, layout.decimal)
 
 
@@ -58,7 +59,35 @@ def read_below(path: Path, headings: list[str], separator: str, lines: int) -> d
     """Return the cells of each column, by heading, below `lines` header lines; bytes that are not UTF-8 are replaced."""
     layout = Layout(headings, {}, lines, separator, ".", "utf-8-sig", ())
     frame = _read(path, layout, "replace")
-    return _cells(_named(headings, frame), frame)
+    named = _named(headings, frame)
+    _tell_short_rows(path, layout, named, frame, "replace")
+    return _cells(named, frame)
+
+
+def _tell_short_rows(path: Path, layout: Layout, headings: Sequence[str], frame: Any, errors: str) -> None:
+    """Warn of rows with fewer cells than there are names: pandas fills them up with NaN, also those of a file that was cut."""
+    if not frame.iloc[:, len(headings) - 1].isna().any():
+        return
+    with path.open(encoding=layout.encoding, errors=errors, newline=None) as file:
+        rows = (
+            (k, _count(line, layout.separator)) for k, line in enumerate(file, 1) if k > layout.first and line.strip()
+        )
+        short = {k: count for k, count in rows if count < len(headings)}
+    if not short:
+        return
+    lacking = ", ".join(headings[min(short.values()) :])
+    one = len(short) == 1
+    warnings.warn(
+        f"{path}: {len(short)} {'row has' if one else 'rows have'} fewer cells than there are names ({len(headings)}), "
+        f"{'in' if one else 'first in'} line {min(short)}: the rest is NaN, in {lacking}. Was the file cut?",
+        JaxvehWarning,
+        stacklevel=3,
+    )
+
+
+def _count(line: str, separator: str) -> int:
+    """Return the number of cells of a line. Separators within quotes are counted as well: no row looks shorter than it is."""
+    return len(line.split()) if separator == BLANKS else line.count(separator) + 1
 
 
 def _named(headings: list[str], frame: Any) -> list[str]:

@@ -11,9 +11,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check, check_at_least, check_finite, check_positive
+from jaxveh._core.errors import InputError, check, check_positive, is_concrete
 from jaxveh._core.parameter import parameter
 from jaxveh.numerics import smooth_step
+
+FASTEST = 150.0
+"""The highest speed of a drive, m/s. Cars on tyres reach 140 m/s; what is faster is another unit or a slip of the pen, and no
+tyre law, solver step or length of a drive was made for it."""
 
 
 class DriverInputs(NamedTuple):
@@ -78,14 +82,35 @@ def constant_speed(steer: jax.Array, speed: jax.Array) -> DriverInputs:
     return DriverInputs(steer=steer, v_x=v_x, v_x_rate=jnp.zeros_like(steer))
 
 
+def check_speed(name: str, speed) -> None:
+    """Raise `InputError` unless a speed is between 0 and `FASTEST`."""
+    check(name, speed, lambda v: (v >= 0) & (v <= FASTEST), f"between 0 and {FASTEST:g} m/s")
+
+
+def check_steer_deg(name: str, steer_deg) -> None:
+    """Raise `InputError` unless a steer in degrees, as programs and studies take it, is within a quarter turn."""
+    check(name, steer_deg, lambda v: abs(v) < 90, "between -90 and 90 degrees at the road wheels")
+
+
 def check_drive(speed, duration, steer=0.0) -> None:
     """Raise `InputError` unless speed, duration and steer are within their ranges."""
-    check_finite("speed", speed)
-    check_at_least("speed", speed, 0.0)
-    check("steer", steer, lambda v: abs(v) < math.pi / 2, "within a quarter turn", "It is in rad, not degrees.")
+    check_speed("speed", speed)
+    check("steer", steer, _below_a_quarter_turn, "within a quarter turn", _advice(speed, steer))
     check_positive("duration", duration, "s")
     if eqx.is_array(duration):
         raise InputError("duration is an array: it must be a Python number, because it sets the number of rows.")
+
+
+def _below_a_quarter_turn(angle) -> Any:
+    return abs(angle) < math.pi / 2
+
+
+def _advice(speed, steer) -> str:
+    """Return what is probably wrong with a steer out of range: the unit, or the order of the arguments."""
+    numbers = [value for value in (speed, steer) if is_concrete(value) and jnp.ndim(value) == 0]
+    if len(numbers) == 2 and _below_a_quarter_turn(speed) and 0 <= steer <= FASTEST:
+        return "The speed comes first, then the steer; the steer is in rad, not degrees."
+    return "It is in rad, not degrees."
 
 
 def as_time(t: Any, like: jax.Array) -> jax.Array:

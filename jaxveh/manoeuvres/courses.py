@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from jaxveh._core.errors import InputError, check_finite, check_positive, is_concrete
-from jaxveh.manoeuvres.base import check_drive
+from jaxveh._core.errors import InputError, check_positive, is_concrete
+from jaxveh.manoeuvres.base import check_drive, check_speed
 from jaxveh.manoeuvres.cones import centre_line, check_slalom, iso_3888_1, iso_3888_2
 from jaxveh.manoeuvres.path_driver import PathDriver
 from jaxveh.manoeuvres.paths import Circle, Sine
@@ -79,7 +79,7 @@ def steady_circle(
     **Raises** `InputError` for values out of range.
     """
     duration = start + time + 2.0 if duration is None else duration
-    check_drive(from_speed, duration)
+    check_speed("from_speed", from_speed)
     check_drive(to_speed, duration)
     speed = ChangingSpeed(from_speed, to_speed, float(start), float(time))
     return PathDriver(path=Circle(radius), speed=speed, duration=float(duration), **driver)
@@ -89,7 +89,7 @@ def _driver(path, speed, length: float, duration: float | None, driver: dict) ->
     if duration is None:
         if not is_concrete(speed):
             raise InputError("duration = None: it cannot be computed from a traced speed; give it in s.")
-        check_finite("speed", speed)
+        check_speed("speed", speed)
         check_positive("speed", speed, "m/s")
         duration = math.ceil(100 * length / float(speed)) / 100
     check_drive(speed, duration)

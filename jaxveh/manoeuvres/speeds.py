@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import check, check_at_least, check_positive
 from jaxveh._core.parameter import check_parameters, parameter
-from jaxveh.manoeuvres.base import as_time
+from jaxveh.manoeuvres.base import as_time, check_speed
 from jaxveh.numerics import gauss_markov_harmonics, smooth_ramp, sum_of_harmonics
 
 
@@ -35,12 +35,12 @@ class AbstractSpeed(eqx.Module):
 
 
 class SteadySpeed(AbstractSpeed):
-    """A constant `speed` (m/s). **Raises** `InputError` for a negative speed."""
+    """A constant `speed` (m/s). **Raises** `InputError` unless it is between 0 and 150 m/s."""
 
     speed: jax.Array = parameter("m/s", scale=20.0)
 
     def __check_init__(self):
-        check_at_least("speed", self.speed, 0.0)
+        check_speed("speed", self.speed)
 
     def v_x(self, t: Any) -> jax.Array:
         return jnp.broadcast_to(self.speed, jnp.shape(t))
@@ -52,7 +52,7 @@ class ChangingSpeed(AbstractSpeed):
     `before`, `after` (m/s): the two speeds; `start` (s): the time at which the change begins; `time` (s): its length;
     `edge` (s, default 1): the time over which the corners are rounded.
 
-    **Raises** `InputError` for negative speeds, or times that are not positive.
+    **Raises** `InputError` for speeds that are not between 0 and 150 m/s, or times that are not positive.
     """
 
     before: jax.Array = parameter("m/s", scale=20.0)
@@ -62,8 +62,8 @@ class ChangingSpeed(AbstractSpeed):
     edge: float = eqx.field(static=True, default=1.0)
 
     def __check_init__(self):
-        check_at_least("before", self.before, 0.0)
-        check_at_least("after", self.after, 0.0)
+        check_speed("before", self.before)
+        check_speed("after", self.after)
         check_positive("time", self.time, "s")
         check_positive("edge", self.edge, "s")
         check("edge", self.edge, lambda v: v <= self.time, f"at most time = {self.time:g} s")
@@ -99,7 +99,7 @@ def wavering_speed(
 
     **Raises** `InputError` for values out of range.
     """
-    check_at_least("mean", mean, 0.0)
+    check_speed("mean", mean)
     check_at_least("std", std, 0.0)
     check_positive("time", time, "s")
     check_positive("fastest", fastest, "s")

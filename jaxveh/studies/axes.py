@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_one_of, check_whole
+from jaxveh._core.errors import InputError, check_one_of, check_seed, check_whole
 from jaxveh.io import kit
 from jaxveh.studies.numbers import flat
 from jaxveh.sweeps import Design, Samples, latin_hypercube, sobol
@@ -94,12 +94,10 @@ def _values(path: str, told: Any, traced: bool) -> Any:
         raise InputError(
             f"{where} = {told!r}: must be a list, such as [1.0, 2.0], or a range, such as {{from = 1.0, to = 2.0, count = 5}}."
         )
-    if traced:
-        return [kit.toml_number(where, value) for value in told]
-    labels = [str(value) for value in told]
-    if len(set(labels)) < len(labels):
+    found = [kit.toml_number(where, value) for value in told] if traced else [str(value) for value in told]
+    if len(set(found)) < len(found):
         raise InputError(f"{where} = {told!r}: has a value twice; give each value once.")
-    return dict(zip(labels, told, strict=True))
+    return found if traced else dict(zip(found, told, strict=True))
 
 
 def _labelled(where: str, told: Any) -> dict[str, Any]:
@@ -134,7 +132,7 @@ def _samples(told: Any) -> Samples:
         kit.check_known(where, "key", key, ("method", "count", "seed", "ranges"))
     method, seed = told.get("method", "sobol"), told.get("seed", 0)
     check_one_of(f"{where}.method", method, METHODS)
-    check_whole(f"{where}.seed", seed, 0)
+    check_seed(f"{where}.seed", seed)
     ranges = flat(told.get("ranges", {}))
     for path in ranges:
         if not is_traced(path):

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxveh import vehicles
-from jaxveh._core.errors import InputError, check_whole
+from jaxveh._core.errors import InputError, check_seed, check_whole
 from jaxveh.io import kit, read_car
 from jaxveh.studies.axes import Varied, axes_of, sampled_paths
 from jaxveh.studies.settings import DEFAULTS, WHOLE, with_defaults
@@ -102,7 +102,7 @@ def study_of(told: Mapping[str, Any], folder: Path = Path()) -> Study:
         kit.check_known("study", "table", key, (*WHOLE, *DEFAULTS))
     seeds, seed = told.get("seeds", SEEDS), told.get("seed", 0)
     check_whole("seeds", seeds)
-    check_whole("seed", seed, 0)
+    check_seed("seed", seed)
     settings, vary = with_defaults(told), told.get("vary", {})
     kit.check_keys("vary", vary, vary)
     for key, found in FILES.items():

@@ -10,6 +10,8 @@ from typing import Any
 import jax
 import numpy as np
 
+from jaxveh._core.errors import check
+from jaxveh.io import kit
 from jaxveh.studies.axes import SAMPLES, Varied, design_of
 from jaxveh.studies.drives import Drive, drive_of
 from jaxveh.studies.estimating import model_of, told_car
@@ -95,6 +97,7 @@ class Study:
             for point in self._ends(objects, lambda path: True):
                 settings = self.at(point)
                 drive = drive_of(settings, self.key, duration)
+                _check_after(settings["metrics"]["after"], drive.driver.duration)
                 filter_of(settings["filter"]).check(model_of(settings, drive))
                 asked_metrics(settings["metrics"]["names"])
 
@@ -130,6 +133,12 @@ class Study:
                 for part in (None,) if axis.columns is None else axis.columns:
                     if moves(self.sampled[part] if part is not None else paths[axis.name] or ""):
                         yield design.point({**first, axis.name: _end(axis, part, end)}, objects)
+
+
+def _check_after(after: Any, duration: float) -> None:
+    """Raise `InputError` unless rows are left to count: without any, errors would be those of no row."""
+    after = kit.toml_number("metrics.after", after)
+    check("metrics.after", after, lambda v: (v >= 0) & (v < duration), f"from 0 to below the duration, {duration:g} s")
 
 
 def _end(axis: Axis, part: str | None, end: Callable[[Any], Any]) -> Any:

@@ -104,6 +104,34 @@ def test_a_word_in_round_brackets_is_no_unit(tmp_path, word):
     np.testing.assert_array_equal(found["v_x"], [36.0, 36.0])
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_rows_that_are_too_short_are_told(tmp_path, seed):
+    """Some rows, or the last one of a file that was cut, end early: how many, the first line, and what is missing."""
+    draw = random.Random(seed)
+    separator, end = draw.choice([",", ";", "\t", "|", " "]), draw.choice(["\n", "\r\n"])
+    names, path = ["time", *TRUTH], tmp_path / f"log{draw.choice(['.csv', '.txt', '.dat'])}"
+    rows = [[repr(float(cell)) for cell in row] for row in zip(TIME, *TRUTH.values(), strict=True)]
+    short = sorted(draw.sample(range(3, ROWS), draw.randint(1, 4))) if draw.random() < 0.7 else [ROWS - 1]
+    kept = {row: draw.randint(2, len(names) - 1) for row in short}
+    above = draw.choice(["", "# logger 7", "# a|b;c,d"] if separator != " " else [""])
+    lines = [separator.join(row[: kept.get(k, len(row))]) for k, row in enumerate(rows)]
+    path.write_bytes(end.join([above, separator.join(names), *lines][not above :]).encode())
+    with pytest.warns(JaxvehWarning) as told:
+        found = io.read_recording(path)
+    words = next(str(one.message) for one in told if "fewer cells" in str(one.message))
+    assert f"{len(short)} row" in words and f"line {short[0] + 2 + bool(above)}:" in words
+    assert f"NaN, in {', '.join(names[min(kept.values()) :])}. " in words
+    for column, name in enumerate(TRUTH, 1):
+        missing = [k for k in short if kept[k] <= column]
+        assert np.flatnonzero(np.isnan(found[name])).tolist() == missing
+    full = [separator.join("" if draw.random() < 0.2 and k else cell for k, cell in enumerate(row)) for row in rows]
+    if separator != " ":
+        path.write_bytes(end.join([separator.join(names), *full, ""]).encode())
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", "fewer cells")
+            io.read_recording(path)
+
+
 def test_the_same_name_in_two_units(tmp_path):
     text = "time,Speed (km/h),Speed (mph)\n0,36,22\n1,36,22\n"
     recording = read(tmp_path / "log.csv", text)

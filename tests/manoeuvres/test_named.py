@@ -1,11 +1,15 @@
 """Manoeuvres by name: each can be made, and says what can be set of it."""
 
+import inspect
+
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxveh import InputError, manoeuvres
 from jaxveh.manoeuvres import MANOEUVRES, Motion, as_driver, manoeuvre_options, named_manoeuvre
+from jaxveh.manoeuvres.base import FASTEST
 from jaxveh.manoeuvres.options import FUNCTIONS
 
 
@@ -30,6 +34,42 @@ def test_every_option_can_be_set_to_its_default(name):
     assert "duration" in manoeuvre_options(name)
     made, usual = named_manoeuvre(name, 20.0, 0.03, **options), named_manoeuvre(name, 20.0, 0.03)
     assert made.duration == usual.duration
+
+
+@pytest.mark.parametrize("name", MANOEUVRES)
+def test_no_named_manoeuvre_takes_a_speed_that_no_car_has(name):
+    for speed in (-0.1, FASTEST + 1.0, 1e6, np.inf, np.nan):
+        with pytest.raises(InputError, match=f"speed = {speed}: must be between 0 and 150 m/s"):
+            named_manoeuvre(name, speed, 0.03)
+
+
+SPEEDS = {
+    "SteadySpeed": (lambda v: manoeuvres.SteadySpeed(v),),
+    "ChangingSpeed": (lambda v: manoeuvres.ChangingSpeed(v, 20.0), lambda v: manoeuvres.ChangingSpeed(20.0, v)),
+    "WaveringSpeed": (lambda v: manoeuvres.wavering_speed(v, 1.0, jax.random.key(0)),),
+}
+
+
+def test_no_law_of_speed_takes_a_speed_that_no_car_has():
+    every = (getattr(manoeuvres, name) for name in manoeuvres.__all__)
+    kinds = {kind.__name__ for kind in every if inspect.isclass(kind) and issubclass(kind, manoeuvres.AbstractSpeed)}
+    assert kinds - {"AbstractSpeed"} == set(SPEEDS)
+    for make in (make for makes in SPEEDS.values() for make in makes):
+        make(FASTEST)
+        with pytest.raises(InputError, match="= 151.0: must be between 0 and 150 m/s"):
+            make(151.0)
+
+
+TURNED = [name for name, make in FUNCTIONS.items() if "steer" in inspect.signature(make).parameters]
+
+
+@pytest.mark.parametrize("name", TURNED)
+def test_a_steer_in_front_of_the_speed_is_told_from_a_steer_in_degrees(name):
+    more = (jax.random.key(0),) if "key" in inspect.signature(FUNCTIONS[name]).parameters else ()
+    with pytest.raises(InputError, match=r"steer = 20.0: must be within a quarter turn. The speed comes first, then"):
+        FUNCTIONS[name](0.05, 20.0, *more)
+    with pytest.raises(InputError, match=r"steer = 3.0: must be within a quarter turn. It is in rad, not degrees"):
+        FUNCTIONS[name](20.0, 3.0, *more)
 
 
 def test_an_option_changes_the_manoeuvre():
