@@ -79,13 +79,15 @@ def kind_of_inner(value) -> str:
     )
 
 
-def check_whole(name: str, value, least: int = 1, advice: str = "") -> None:
-    """Raise `InputError` unless `value` is a Python or NumPy integer of at least `least`; floats and truth values are refused."""
+def check_whole(name: str, value, least: int = 1, advice: str = "", most: int | None = None) -> None:
+    """Raise `InputError` unless `value` is a Python or NumPy integer of at least `least` and at most `most`.
+
+    Floats and truth values are refused.
+    """
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
-    if not whole or value < least:
-        raise InputError(
-            f"{name} = {value}: must be a whole number of at least {least}." + (f" {advice}" if advice else "")
-        )
+    if not whole or value < least or (most is not None and value > most):
+        allowed = f"of at least {least}" if most is None else f"from {least} to {most}"
+        raise InputError(f"{name} = {value}: must be a whole number {allowed}." + (f" {advice}" if advice else ""))
 
 
 LARGEST_SEED = 2**63 - 1
@@ -94,9 +96,7 @@ LARGEST_SEED = 2**63 - 1
 
 def check_seed(name: str, value) -> None:
     """Raise `InputError` unless `value` is a whole number from 0 to `LARGEST_SEED`."""
-    check_whole(name, value, 0)
-    if value > LARGEST_SEED:
-        raise InputError(f"{name} = {value}: must be at most {LARGEST_SEED}, 2^63 - 1.")
+    check_whole(name, value, 0, most=LARGEST_SEED)
 
 
 def check_one_of(name: str, value, allowed) -> None:
@@ -113,7 +113,7 @@ WHEELS = {"front_left": "fl", "front_right": "fr", "rear_left": "rl", "rear_righ
 
 def near(name: str, names: Iterable[str]) -> list[str]:
     """Return the names that are similar to `name`, the nearest first; case is ignored, and wheels may have their long names."""
-    names = list(names)
+    names, name = list(names), str(name)
     for whole, short in WHEELS.items():
         if name.casefold().endswith(whole) and name[: -len(whole)] + short in names:
             return [name[: -len(whole)] + short]

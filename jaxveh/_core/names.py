@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections import namedtuple
 from collections.abc import Iterable, Mapping
+from keyword import iskeyword
 from typing import Any
 
 from jaxveh._core.errors import InputError, did_you_mean
@@ -32,6 +33,12 @@ def record_type(name: str, fields: Iterable[str]):
     twice = sorted({field for field in fields if fields.count(field) > 1})
     if twice:
         raise InputError(f"{name} has the field(s) {', '.join(twice)} twice: every name must be unique.")
+    wrong = [field for field in fields if not (isinstance(field, str) and field.isidentifier()) or iskeyword(field)]
+    if wrong:
+        shown = ", ".join(map(repr, wrong))
+        raise InputError(
+            f"{name}: {shown}: no name of a field: it needs letters, digits and _, and may be no word of Python."
+        )
     return _record_type(name, fields)
 
 

@@ -31,6 +31,9 @@ OVERCONFIDENCE = 8.0
 """The likelihood's information is divided by this: balances of neighbouring rows are correlated but count as independent.
 Chosen together with `parameter_bands.WIDER`, see there."""
 
+UNSURE = 1e-3
+"""A variance of the fit may be this share above the prior's; what is more is lost in rounding."""
+
 TARGET_BEND = 0.0035
 """rad: larger errors count less than their square (INS alignment, tyres that warm up)."""
 
@@ -100,13 +103,24 @@ def fit_rear_axle(
 
 def _widened(fit: Fit, spread: np.ndarray) -> Fit:
     """The fit with the likelihood's information divided by `OVERCONFIDENCE`, and the prior's unchanged."""
-    prior = np.diag(1 / spread**2)
-    information = np.linalg.inv(np.asarray(fit.covariance)) - prior
-    covariance = np.linalg.inv(information / OVERCONFIDENCE + prior)
-    named = fit.parameters_std
-    wider = np.sqrt(np.diag(covariance) / np.diag(np.asarray(fit.covariance)))
-    std = type(named)({p.name: named[p.name] * wide for p, wide in zip(fit.chosen, wider, strict=True)})
-    return dataclasses.replace(fit, covariance=jnp.asarray(covariance, fit.covariance.dtype), parameters_std=std)
+    # Relative to the prior, the variances along the principal directions are between 0 and 1. Where data say nothing,
+    # rounding in float32 brings them outside, and the information below zero.
+    scale = np.outer(spread, spread)
+    shares, directions = np.linalg.eigh(np.asarray(fit.covariance, float) / scale)
+    if shares[0] < 0 or shares[-1] > 1 + UNSURE:
+        warnings.warn(
+            "sideslip: the covariance of the fit is lost in rounding, its standard deviations are rough. Use float64: "
+            'jax.config.update("jax_enable_x64", True).',
+            JaxvehWarning,
+            stacklevel=4,
+        )
+    shares = np.clip(shares, np.finfo(fit.covariance.dtype).eps, 1.0)
+    told, wide = (
+        scale * (directions * one @ directions.T) for one in (shares, 1 / ((1 / shares - 1) / OVERCONFIDENCE + 1))
+    )
+    named, wider = fit.parameters_std, np.sqrt(np.diag(wide) / np.diag(told))
+    std = type(named)({p.name: named[p.name] * ratio for p, ratio in zip(fit.chosen, wider, strict=True)})
+    return dataclasses.replace(fit, covariance=jnp.asarray(wide, fit.covariance.dtype), parameters_std=std)
 
 
 def _starts(problem, model: StateSpace, in_use: float) -> list:

@@ -10,7 +10,7 @@ from jaxveh.io.property_file import PROPERTY_UNITS, Entry, parse_property_file
 from jaxveh.io.result_files import RESULT_SUFFIXES, load_result, save_result
 from jaxveh.io.rig_table import RIG_CHANNELS
 from jaxveh.io.steering import check_front_steered
-from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
+from jaxveh.io.toml import check_keys, read_toml, shorten, toml_number, toml_string, toml_text
 from jaxveh.io.units import is_unit, same_unit
 
 __all__ = [
@@ -37,6 +37,7 @@ __all__ = [
     "require",
     "same_unit",
     "save_result",
+    "shorten",
     "toml_number",
     "toml_string",
     "toml_text",

@@ -67,7 +67,7 @@ def named_road(name: str | os.PathLike, key: jax.Array | None = None) -> Abstrac
     if str(name) in ROADS:
         road = ROADS[str(name)]
         return road.make(key) if road.random else road.make()
-    if Path(name).suffix.lower() == ".toml":
+    if isinstance(name, str | os.PathLike) and Path(name).suffix.lower() == ".toml":
         return from_specification(read_road(name))
     guess = did_you_mean([str(name)], ROADS)
     raise InputError(f"road = {str(name)!r}: must be one of {', '.join(ROADS)}, or a file that ends in .toml.{guess}")

@@ -60,11 +60,20 @@ class Grid(NamedTuple):
         return each if even else None
 
 
+MOST_ROWS, MOST_STEPS = 10**7, 10**8
+"""The most rows (a day at 100 Hz) and steps of a drive: more would not fit into the memory."""
+
+
 def even_grid(duration: float, dt: float, max_step: float) -> Grid:
     """Rows at 0, dt, 2 dt, ...; steps of at most `max_step` that meet each of them."""
     check_positive("dt", dt, "s")
     check_positive("max_step", max_step, "s")
     check("dt", dt, lambda v: v <= duration, f"at most the manoeuvre's duration, {duration:g} s")
+    if duration / dt > MOST_ROWS or duration / max_step > MOST_STEPS:
+        raise InputError(
+            f"duration = {duration:g} s, rows every {dt:g} s, steps of {max_step:g} s: must be at most {MOST_ROWS:.0e} rows and "
+            f"{MOST_STEPS:.0e} steps. Shorten the drive, or lengthen rows and steps."
+        )
     # A duration that is a whole number of steps except for rounding keeps its last row.
     count = math.floor(duration / dt + 1e-9)
     rows = dt * np.arange(count + 1)

@@ -19,6 +19,9 @@ RANGE = ("from", "to", "count", "scale")
 METHODS = {"latin-hypercube": latin_hypercube, "sobol": sobol}
 SCALES = ("linear", "log")
 
+MOST = 10**7
+"""The most points of a range, and the most seeds: what is more would not fit into the memory, and is a slip of the pen."""
+
 TRACED = ("car.", "told.", "sensors.", "process_noise.", "measurement_noise.", "drive.speed", "drive.steer_deg")
 """Settings that vary within one program; for all others each value is a program of its own."""
 
@@ -117,7 +120,7 @@ def _range(where: str, told: Mapping[str, Any]) -> list[float]:
         kit.check_known(where, "key", key, RANGE)
     low, high = (kit.toml_number(f"{where}.{key}", told[key]) for key in ("from", "to"))
     count, scale = told.get("count", 5), told.get("scale", "linear")
-    check_whole(f"{where}.count", count, 2)
+    check_whole(f"{where}.count", count, 2, most=MOST)
     check_one_of(f"{where}.scale", scale, SCALES)
     if scale == "log" and not (low > 0 and high > 0):
         raise InputError(f"{where}: from {low:g} to {high:g}: a logarithmic range must be positive.")
@@ -133,13 +136,17 @@ def _samples(told: Any) -> Samples:
     method, seed = told.get("method", "sobol"), told.get("seed", 0)
     check_one_of(f"{where}.method", method, METHODS)
     check_seed(f"{where}.seed", seed)
-    ranges = flat(told.get("ranges", {}))
-    for path in ranges:
+    count, ranges = told.get("count", 64), told.get("ranges", {})
+    check_whole(f"{where}.count", count, most=MOST)
+    if not isinstance(ranges, Mapping):
+        raise InputError(f"{where}.ranges = {kit.shorten(ranges)}: must be a table of names and [low, high].")
+    ranges = flat(ranges)
+    for path, ends in ranges.items():
+        if not isinstance(ends, list | tuple) or len(ends) != 2:
+            raise InputError(f"{where}.ranges: {path} = {kit.shorten(ends)}: must be [low, high].")
         if not is_traced(path):
             raise InputError(f"{where}.ranges: {path} cannot vary within one program; give it its own list in [vary].")
-    return METHODS[method](
-        told.get("count", 64), seed=seed, **{field_of(path): tuple(ends) for path, ends in ranges.items()}
-    )
+    return METHODS[method](count, seed=seed, **{field_of(path): tuple(ends) for path, ends in ranges.items()})
 
 
 def sampled_paths(vary: Mapping[str, Any]) -> dict[str, str]:

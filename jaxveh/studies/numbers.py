@@ -8,7 +8,7 @@ from typing import Any
 import jax.numpy as jnp
 
 from jaxveh._core.bijectors import Positive
-from jaxveh._core.errors import check_finite, check_positive
+from jaxveh._core.errors import InputError, check_finite, check_positive
 from jaxveh._core.parameter import every_parameter, pick, put
 from jaxveh.io import kit
 
@@ -26,10 +26,13 @@ def with_numbers(what: str, thing: Any, numbers: Mapping[str, Any]) -> Any:
         check = check_positive if isinstance(known[name].domain, Positive) else check_finite
         check(f"{what}.{name}", value, known[name].unit)
     chosen = tuple(known[name] for name in numbers)
-    values = [
-        jnp.broadcast_to(jnp.asarray(value, jnp.asarray(old).dtype), jnp.shape(old))
-        for value, old in zip(numbers.values(), pick(thing, chosen), strict=True)
-    ]
+    values = []
+    for (name, value), old in zip(numbers.items(), pick(thing, chosen), strict=True):
+        shape = jnp.shape(old)
+        if jnp.shape(value) not in ((), shape):
+            allowed = f"one number, or numbers of shape {shape}" if shape else "one number"
+            raise InputError(f"{what}.{name} = {kit.shorten(value)}: must be {allowed}.")
+        values.append(jnp.broadcast_to(jnp.asarray(value, jnp.asarray(old).dtype), shape))
     return put(thing, chosen, values)
 
 

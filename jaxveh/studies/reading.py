@@ -10,7 +10,7 @@ from typing import Any
 from jaxveh import vehicles
 from jaxveh._core.errors import InputError, check_seed, check_whole
 from jaxveh.io import kit, read_car
-from jaxveh.studies.axes import Varied, axes_of, sampled_paths
+from jaxveh.studies.axes import MOST, Varied, axes_of, sampled_paths
 from jaxveh.studies.settings import DEFAULTS, WHOLE, with_defaults
 from jaxveh.studies.study import Study
 
@@ -101,7 +101,7 @@ def study_of(told: Mapping[str, Any], folder: Path = Path()) -> Study:
     for key in told:
         kit.check_known("study", "table", key, (*WHOLE, *DEFAULTS))
     seeds, seed = told.get("seeds", SEEDS), told.get("seed", 0)
-    check_whole("seeds", seeds)
+    check_whole("seeds", seeds, most=MOST)
     check_seed("seed", seed)
     settings, vary = with_defaults(told), told.get("vary", {})
     kit.check_keys("vary", vary, vary)

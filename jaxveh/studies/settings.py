@@ -6,9 +6,12 @@ import copy
 from collections.abc import Mapping
 from typing import Any
 
-from jaxveh._core.errors import InputError
-from jaxveh.io import kit
+import numpy as np
+
+from jaxveh._core.errors import InputError, is_concrete
+from jaxveh.io import CarSpecification, kit
 from jaxveh.manoeuvres import MANOEUVRES, USUAL, manoeuvre_options
+from jaxveh.studies.numbers import flat
 
 DEFAULTS: dict[str, dict[str, Any]] = {
     "drive": {
@@ -31,6 +34,37 @@ WHOLE = ("seeds", "seed", "vary")
 
 OF_DRIVE = ("vehicle", "fidelity", "manoeuvre", "road", "rate", "speed", "steer_deg", "duration")
 """Keys of `drive` besides the manoeuvre's own options."""
+
+
+NUMBERS = ("drive", "car", "sensors", "told", "process_noise", "measurement_noise")
+"""Tables whose values are numbers, except those of `TEXTS`."""
+
+TEXTS = (
+    "drive.vehicle", "drive.fidelity", "drive.manoeuvre", "drive.road", "sensors.devices", "estimator.name", "estimator.fidelity",
+)  # fmt: skip
+
+
+def check_kinds(settings: Mapping[str, Any]) -> None:
+    """Raise `InputError` for a text, a truth value or an empty list where a number belongs, and for what is no text where a
+    text does. Cars' files have been read, and traced numbers pass."""
+    for table in DEFAULTS:
+        for key, value in flat(settings[table]).items():
+            path = f"{table}.{key}"
+            if path in TEXTS or table == "channels":
+                if not isinstance(value, str | CarSpecification):
+                    raise InputError(f"{path} = {kit.shorten(value)}: must be a text in quotes.")
+            elif table in NUMBERS and is_concrete(value) and not _is_number(value):
+                raise InputError(f"{path} = {kit.shorten(value)}: must be a number, or a list of numbers.")
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value is a number or an array of numbers, and not empty."""
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):
+        return False
+    # A whole number that no integer type holds is an object to NumPy.
+    return array.size > 0 and (array.dtype.kind in "iuf" or type(value) is int)
 
 
 def with_defaults(told: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

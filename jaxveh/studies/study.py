@@ -19,7 +19,7 @@ from jaxveh.studies.metrics import asked_metrics, unit_of_metric
 from jaxveh.studies.named_filters import filter_of
 from jaxveh.studies.numbers import flat, unit_of
 from jaxveh.studies.one_run import run_of
-from jaxveh.studies.settings import put_at
+from jaxveh.studies.settings import check_kinds, put_at
 from jaxveh.sweeps import Axis, Design
 
 UNITS = {"drive.speed": "m/s", "drive.steer_deg": "°", "drive.duration": "s", "drive.rate": "Hz"}
@@ -92,7 +92,10 @@ class Study:
 
         **Raises** `InputError` for an unknown name or a value out of range.
         """
+        check_kinds(self.settings)
         for _, _, objects in self.design.combinations():
+            for point in self._ends(objects, lambda path: False):
+                check_kinds(self.at(point))
             duration = self._duration(next(self._ends(objects, lambda path: False)))
             for point in self._ends(objects, lambda path: True):
                 settings = self.at(point)

@@ -2,6 +2,8 @@
 
 import dataclasses
 import functools
+import warnings
+from types import SimpleNamespace
 
 import equinox as eqx
 import jax
@@ -10,7 +12,7 @@ import numpy as np
 import pytest
 import test_sideslip
 
-from jaxveh import InputError, Recording, estimators, filters, io, vehicles
+from jaxveh import InputError, JaxvehWarning, Parameters, Recording, estimators, filters, io, vehicles
 from jaxveh._core.names import record
 from jaxveh.estimators import coarse_log, rear_axle, rear_axle_fit
 from jaxveh.vehicles import sets
@@ -270,3 +272,43 @@ def test_the_likelihood_has_gradients_in_every_parameter():
         )
         difference = float(eqx.filter_jit(cost)(at(1)) - eqx.filter_jit(cost)(at(-1))) / (2 * step)
         assert float(getattr(slopes.system, name)) == pytest.approx(difference, rel=1e-4, abs=1e-5), name
+
+
+@dataclasses.dataclass(frozen=True)
+class FakeFit:
+    """What `_widened` reads of a fit."""
+
+    covariance: jax.Array
+    parameters_std: Parameters
+    chosen: list
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_covariance_that_is_lost_in_rounding_is_told_and_stays_positive(seed):
+    """Data that tell of some directions alone, in single precision; and the same without rounding, as the formula has it."""
+    draw = np.random.default_rng(seed)
+    size = 9
+    spread = 10.0 ** draw.uniform(-3, 0, size)
+    told = draw.normal(size=(size, draw.integers(2, size))) * 10.0 ** draw.uniform(0, 3)
+    information = told @ told.T / np.outer(spread, spread)
+    prior = np.diag(1 / spread**2)
+    names = [SimpleNamespace(name=f"p{k}") for k in range(size)]
+    fit_of = lambda cov: FakeFit(
+        jnp.asarray(cov),
+        Parameters({one.name: s for one, s in zip(names, np.sqrt(np.abs(np.diag(cov))), strict=True)}),
+        names,
+    )
+    exact = np.linalg.inv(information + prior)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        wide = rear_axle_fit._widened(fit_of(exact), spread)
+    wanted = np.linalg.inv(information / rear_axle_fit.OVERCONFIDENCE + prior)
+    np.testing.assert_allclose(wide.covariance, wanted, rtol=1e-5, atol=1e-9 * np.abs(wanted).max())
+    stds = np.array([wide.parameters_std[one.name] for one in names])
+    np.testing.assert_allclose(stds, np.sqrt(np.diag(wanted)), rtol=1e-6)
+    # Rounding of this size leaves no variance along what the data tell, and too much along the rest.
+    noise = draw.normal(size=(size, size)) * 0.05 * np.outer(spread, spread)
+    with pytest.warns(JaxvehWarning, match="lost in rounding.*jax_enable_x64"):
+        rough = rear_axle_fit._widened(fit_of((exact + noise + noise.T).astype(np.float32)), spread)
+    assert np.isfinite(rough.covariance).all()
+    assert (np.diag(rough.covariance) > 0).all() and (np.diag(rough.covariance) <= spread**2 * (1 + 1e-6)).all()

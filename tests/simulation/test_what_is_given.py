@@ -39,6 +39,13 @@ def test_one_device_is_a_suite_of_one():
     np.testing.assert_array_equal(alone["yaw_rate"], suite["yaw_rate"])
 
 
+@pytest.mark.parametrize("given", [{"duration": 1e9}, {"dt": 1e-9}, {"max_step": 1e-9}])
+def test_a_drive_that_fits_into_no_memory_is_refused(given):
+    drive = manoeuvres.step_steer(25.0, 0.02, **{name: given[name] for name in given if name == "duration"})
+    with pytest.raises(InputError, match=r"duration = .*: must be at most 1e\+07 rows and 1e\+08 steps"):
+        simulate(linear(), drive, **{name: given[name] for name in given if name != "duration"})
+
+
 def test_an_event_that_is_none_is_refused():
     with pytest.raises(InputError, match=r"until = standstill: must be an Event such as simulation\.standstill\(\)"):
         simulate(linear(), STEER, until=simulation.standstill)

@@ -1,5 +1,10 @@
 """A study's file: the schema reads as it is; what is wrong is named with what there is."""
 
+import copy
+import functools
+import random
+import re
+
 import pytest
 from small_studies import DRIVE
 
@@ -48,7 +53,7 @@ def test_a_roads_file_is_found_from_the_studys_folder(tmp_path):
 
 BAD = {
     "seed = 1\n[drives]\n": "no table 'drives' (did you mean 'drive'?)",
-    "seeds = 0": "seeds = 0: must be a whole number of at least 1",
+    "seeds = 0": "seeds = 0: must be a whole number from 1 to 10000000",
     "seed = -1": "seed = -1",
     'drive = "fast"': "drive = 'fast': must be a table",
     '[drive]\nvehicle = "sedam"': "no car 'sedam' (did you mean 'sedan'?)",
@@ -78,6 +83,9 @@ BAD = {
     '[filter]\nname = "extended"\nparticles = 3': "no option 'particles'",
     '[filter]\nname = "gated"\ninner = "extendet"': "no filter 'extendet'",
     '[filter]\nname = "unscented"\nform = "square"': "no form 'square'",
+    "[metrics]\nafter = -1.0": "metrics.after = -1.0: must be from 0 to below the duration, 7 s",
+    "[metrics]\nafter = 7.0": "metrics.after = 7.0: must be from 0 to below the duration, 7 s",
+    '[metrics]\nafter = "late"': "metrics.after = 'late': must be a finite number",
     "[metrics]\nnames = []": "metrics.names = []: must be a list of names",
     '[metrics]\nnames = ["rmse"]': "rmse is of a quantity",
     '[metrics]\nnames = ["nis.v_y"]': "nis is of the whole run",
@@ -96,8 +104,8 @@ BAD = {
     '[vary]\n"drive.speed" = [15.0, 20, 15]': "vary.drive.speed = [15.0, 20, 15]: has a value twice",
     '[vary]\n"car.mass" = {from = 1400.0, to = 1400.0, count = 3}': "has a value twice",
     '[vary]\n"drive.speed" = [20.0, 1e6]': "drive.speed = 1000000.0: must be between 0 and 150 m/s",
-    "seed = 99999999999999999999": "seed = 99999999999999999999: must be at most 9223372036854775807",
-    '[vary.samples]\nseed = 9223372036854775808\nranges = {"car.mass" = [1.0, 2.0]}': "= 9223372036854775808: must be at most",
+    "seed = 99999999999999999999": "seed = 99999999999999999999: must be a whole number from 0 to 9223372036854775807",
+    '[vary.samples]\nseed = 9223372036854775808\nranges = {"car.mass" = [1.0, 2.0]}': "a whole number from 0 to 922",
     '[vary]\n"car.mass" = [1.0]\ncar.mass = [2.0]': "car_mass is there twice",
     "[vary]\nfilter = 3": "must be a list of names, or a table of labels",
     '[vary]\nfilter = ["extended", "no"]': "no filter 'no'",
@@ -132,3 +140,60 @@ def test_ranges_have_equal_steps_or_equal_ratios():
     axes = studies.study_of({"vary": ranges}).design.axes
     assert axes[0].labels == (1000.0, 1500.0, 2000.0)
     assert axes[1].labels == pytest.approx((10.0, 100.0, 1000.0))
+
+
+WHOLE = {
+    **DRIVE,
+    "drive": {**DRIVE["drive"], "vehicle": "passenger_car", "fidelity": "single-track", "road": "level", "ramp": 0.2},
+    "metrics": {"names": ["rmse.sideslip"], "after": 0.5},
+    "seed": 0,
+    "car": {"mass": 1550.0, "front": {"B": 9.0}},
+    "sensors": {"devices": "esc", "a_y": 0.1},
+    "channels": {"yaw_rate": "yaw_rate"},
+    "estimator": {"name": "state-space", "fidelity": "single-track"},
+    "told": {"yaw_inertia": 2300.0},
+    "process_noise": {"v_y": 0.05},
+    "measurement_noise": {"yaw_rate": 0.01},
+    "filter": {"name": "particle-filter", "particles": 10},
+    "vary": {
+        "drive.speed": [15.0, 20.0],
+        "car.mass": {"from": 1400.0, "to": 1700.0, "count": 2, "scale": "linear"},
+        "samples": {"method": "latin-hypercube", "count": 3, "seed": 0, "ranges": {"told.mass": [1500.0, 1600.0]}},
+    },
+}
+WRONG = ("x", "", True, [], [[]], [1.0, "a"], {}, {"name": 3}, {"from": 1}, -1e9, 10**30, float("nan"), float("inf"), 0)
+
+
+def places(table, before=()):
+    for key, value in table.items():
+        yield (*before, key)
+        if isinstance(value, dict):
+            yield from places(value, (*before, key))
+
+
+CASES = [(place, wrong) for place in places(WHOLE) for wrong in WRONG]
+random.Random(5).shuffle(CASES)
+
+
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.full) for k in range(1, 16))])
+def test_a_value_of_any_kind_at_any_place_is_read_or_refused(part):
+    for place, wrong in CASES[part::16]:
+        told = copy.deepcopy(WHOLE)
+        functools.reduce(lambda table, key: table[key], place[:-1], told)[place[-1]] = wrong
+        try:
+            studies.study_of(told).check()
+        except InputError:
+            pass
+        except Exception as error:
+            raise AssertionError(f"{'.'.join(place)} = {wrong!r}: {error!r}") from error
+
+
+@pytest.mark.parametrize("table", ["drive", "car", "sensors", "told", "process_noise", "measurement_noise"])
+def test_no_truth_value_or_text_is_taken_for_a_number(table):
+    for key, value in studies.study_of(WHOLE).settings[table].items():
+        if isinstance(value, dict):
+            continue
+        for wrong in (True, [], [[]], "1", ["1"]) if isinstance(value, float) else (True, 1, [], ["level"]):
+            told = {**WHOLE, table: {**WHOLE[table], key: wrong}}
+            with pytest.raises(InputError, match=re.escape(f"{table}.{key} = ")):
+                studies.study_of(told).check()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, word_for
 from jaxveh._core.plain import plain_float
 from jaxveh.io import AxleTyre, CarSpecification
 from jaxveh.vehicles.base import GRAVITY
@@ -57,6 +57,10 @@ def specification_of(numbers: CarNumbers) -> CarSpecification:
     **Raises** `InputError` for a car without mass, yaw inertia or tyres, which every file needs, or a steering that no file can
     describe.
     """
+    if not isinstance(numbers, CarNumbers):
+        raise InputError(
+            f"specification_of: numbers = {word_for(numbers)}: must be CarNumbers, such as numbers_of returns."
+        )
     missing = [name for name in ("mass", "yaw_inertia", "front", "rear") if getattr(numbers, name) is None]
     if missing:
         raise InputError(f"{numbers.name}: a car's file needs {', '.join(missing)}, missing from its numbers.")
