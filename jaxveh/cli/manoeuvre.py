@@ -11,7 +11,6 @@ import jax
 from jaxveh import InputError, manoeuvres
 from jaxveh._core.errors import check_one_of, did_you_mean
 from jaxveh.manoeuvres import MANOEUVRES, USUAL, Course, manoeuvre_options, options_of_car
-from jaxveh.manoeuvres.base import check_speed, check_steer_deg
 
 NOT_SET = {"speed": "--speed", "to_speed": "--speed", "steer": "--steer-deg", "duration": "--duration", "key": "--seed"}
 """Settings that have a command-line option of their own."""
@@ -36,8 +35,8 @@ def parse_manoeuvre(
     """
     check_one_of("--manoeuvre", name, MANOEUVRES)
     # In the units of the options: the manoeuvre itself would tell of rad.
-    check_speed("--speed", speed)
-    check_steer_deg("--steer-deg", steer_deg)
+    manoeuvres.kit.check_speed("--speed", speed)
+    manoeuvres.kit.check_steer_deg("--steer-deg", steer_deg)
     usual_speed, usual_steer = USUAL[name]
     options = {**options_of_car(name, car), **_settings(name, settings)}
     if duration is not None:

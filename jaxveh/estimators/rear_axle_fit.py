@@ -15,6 +15,7 @@ import numpy as np
 from jaxveh._core.errors import FilterError, InputError, JaxvehWarning
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
+from jaxveh.estimators.rear_axle import rolling_below
 from jaxveh.estimators.rear_axle_prior import SPREADS, STOOD, chosen_parameters
 from jaxveh.estimators.standing import Offsets
 from jaxveh.filters import AbstractFilter
@@ -65,8 +66,10 @@ def fit_rear_axle(
     """
     forces = np.concatenate([_forces(model, log) for log in logs])
     if not len(forces):
+        speeds = np.concatenate([np.asarray(log["v_x"], float) for log in logs])
         raise InputError(
-            "sideslip: no row is fast enough and measured: there is nothing to calibrate on. Take a span in which the car drives."
+            f"sideslip: no row is fast enough and measured: v_x is {np.nanmin(speeds):.3g} to {np.nanmax(speeds):.3g} m/s, and "
+            f"must be above {float(rolling_below(model.system.wheelbase)):.2g} m/s, forward. Take a span in which the car drives."
         )
     # A blind fit has a reference without values: so one compiled function serves all fits.
     nothing = [jnp.full(len(log), jnp.nan) for log in logs]

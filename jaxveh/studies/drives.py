@@ -12,7 +12,6 @@ from jaxveh import manoeuvres, roads, sensors, simulation, vehicles
 from jaxveh._core.errors import InputError, check_one_of, check_positive
 from jaxveh._core.recording import Recording
 from jaxveh.io import CarSpecification, kit
-from jaxveh.manoeuvres.base import check_speed, check_steer_deg
 from jaxveh.studies.numbers import flat, with_numbers
 from jaxveh.studies.settings import OF_DRIVE, check_drive, speed_and_steer
 
@@ -61,8 +60,8 @@ def drive_of(settings: Mapping[str, Any], key: jax.Array, duration: float | None
         options["duration"] = length
     speed, steer_deg = speed_and_steer(drive)
     # In the units of the file: the manoeuvre itself would tell of rad.
-    check_speed("drive.speed", speed)
-    check_steer_deg("drive.steer_deg", steer_deg)
+    manoeuvres.kit.check_speed("drive.speed", speed)
+    manoeuvres.kit.check_steer_deg("drive.steer_deg", steer_deg)
     driver = manoeuvres.named_manoeuvre(drive["manoeuvre"], speed, steer_deg * (math.pi / 180), driver_key, **options)
     check_positive("drive.rate", drive["rate"], "Hz")
     return Drive(

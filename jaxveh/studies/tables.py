@@ -68,7 +68,9 @@ def _against_nothing(found: Swept, errors: list[str]) -> Table:
     for name in errors:
         nothing = baseline_of(found, name)
         if nothing is not None and found.seeds > 1:
-            rows.append((name, *_comparison(compare_by_seed(np.asarray(found[name]), np.asarray(found[nothing])))))
+            rows.append(
+                (name, *_comparison(*_computed(np.asarray(found[name], float), np.asarray(found[nothing], float))))
+            )
     return Table("Against doing nothing (baseline), on the same drives", ("error", *COMPARED), rows)
 
 
@@ -82,7 +84,7 @@ def _pairs(found: Swept, errors: list[str], axis: Axis) -> Table:
     for name in errors if found.seeds > 1 else ():
         values = np.moveaxis(np.asarray(found[name], float), place, 0)
         for i in range(1, len(axis.labels)):
-            rows.append((name, str(axis.labels[i]), *_comparison(compare_by_seed(values[i], values[0]))))
+            rows.append((name, str(axis.labels[i]), *_comparison(values[i], values[0])))
     title = f"{axis.name} against {axis.labels[0]}, on the same drives (a seed counts with its geometric mean over all points)"
     return Table(title, ("error", axis.name, *COMPARED), rows, 2)
 
@@ -96,7 +98,17 @@ def _ranks(found: Swept, errors: list[str], axis: Axis) -> Table:
     return Table(f"Ranks of {axis.name} on the same drives", ("error", axis.name, "mean rank", "best in"), rows, 2)
 
 
-def _comparison(one: Comparison) -> tuple[Any, ...]:
+def _computed(values: np.ndarray, nothing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The seeds of which something is known: doing nothing never fails, so runs without its error are not computed yet."""
+    there = np.isfinite(nothing).reshape(-1, nothing.shape[-1]).any(axis=0)
+    return values[..., there], nothing[..., there]
+
+
+def _comparison(a: np.ndarray, b: np.ndarray) -> tuple[Any, ...]:
+    """The cells of a comparison; where no run of either is finite, or fewer than two seeds are left, there is none."""
+    if a.shape[-1] < 2 or not (np.isfinite(a) | np.isfinite(b)).any():
+        return ("-",) * len(COMPARED)
+    one = compare_by_seed(a, b)
     low, high = float(one.ratio.low), float(one.ratio.high)
     return float(one.ratio.value), f"{low:.3g} to {high:.3g}", f"{100 * float(one.wins):.1f} %"
 

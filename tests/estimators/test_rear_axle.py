@@ -215,8 +215,10 @@ def test_a_coarse_logs_steps_are_the_integral_of_what_is_slow():
 
 def test_a_span_in_which_nothing_drives_or_is_measured_is_refused():
     log = drive_of(test_sideslip.CAR, seconds=25.0).without("v_y")
-    with pytest.raises(InputError, match="no row is fast enough and measured"):
-        estimators.sideslip.calibrate(test_sideslip.CAR, log.replace(v_x=np.zeros(len(log))))
+    for speed in (0.0, 0.5, -15.0):
+        words = f"no row is fast enough and measured: v_x is {speed:g} to {speed:g} m/s, and must be above 1"
+        with pytest.raises(InputError, match=words):
+            estimators.sideslip.calibrate(test_sideslip.CAR, log.replace(v_x=np.full(len(log), speed)))
     with pytest.raises(InputError, match="yaw_rate .* is NaN in every row"):
         estimators.sideslip.calibrate(test_sideslip.CAR, log.replace(yaw_rate=np.full(len(log), np.nan)))
 

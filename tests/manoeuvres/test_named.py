@@ -9,7 +9,6 @@ import pytest
 
 from jaxveh import InputError, manoeuvres
 from jaxveh.manoeuvres import MANOEUVRES, Motion, as_driver, manoeuvre_options, named_manoeuvre
-from jaxveh.manoeuvres.base import FASTEST
 from jaxveh.manoeuvres.options import FUNCTIONS
 
 
@@ -38,7 +37,7 @@ def test_every_option_can_be_set_to_its_default(name):
 
 @pytest.mark.parametrize("name", MANOEUVRES)
 def test_no_named_manoeuvre_takes_a_speed_that_no_car_has(name):
-    for speed in (-0.1, FASTEST + 1.0, 1e6, np.inf, np.nan):
+    for speed in (-0.1, manoeuvres.kit.FASTEST + 1.0, 1e6, np.inf, np.nan):
         with pytest.raises(InputError, match=f"speed = {speed}: must be between 0 and 150 m/s"):
             named_manoeuvre(name, speed, 0.03)
 
@@ -55,9 +54,11 @@ def test_no_law_of_speed_takes_a_speed_that_no_car_has():
     kinds = {kind.__name__ for kind in every if inspect.isclass(kind) and issubclass(kind, manoeuvres.AbstractSpeed)}
     assert kinds - {"AbstractSpeed"} == set(SPEEDS)
     for make in (make for makes in SPEEDS.values() for make in makes):
-        make(FASTEST)
+        make(manoeuvres.kit.FASTEST)
         with pytest.raises(InputError, match="= 151.0: must be between 0 and 150 m/s"):
             make(151.0)
+    with pytest.raises(InputError, match="from_speed = 151.0: must be between 0 and 150 m/s"):
+        manoeuvres.steady_circle(from_speed=151.0)
 
 
 TURNED = [name for name, make in FUNCTIONS.items() if "steer" in inspect.signature(make).parameters]

@@ -51,6 +51,26 @@ def test_every_point_has_a_row():
     assert table.rows[1][:3] == ("10", "0.0572958", "B")
 
 
+@pytest.mark.parametrize("done", [0, 1, 3])
+def test_seeds_that_are_not_computed_yet_are_no_ties(done):
+    """Of a store that is half done, or in which nothing is finite: what is shown is what the seeds that are done say."""
+    whole = swept()
+    late = {name: np.array(values, float) for name, values in whole.values.items()}
+    for values in late.values():
+        values[:, :, :, :, done:] = np.nan
+    rows = lambda one: {t.title.partition(" against")[0]: t.rows for t in studies.tables(one) if "ratio" in t.columns}
+    told = rows(sweeps.Swept(whole.design, 5, late, UNITS, "a note"))
+    (against,) = told["Against doing nothing (baseline), on the same drives"]
+    if done < 2:
+        assert against[1:] == ("-", "-", "-")
+    else:
+        first = {name: values[:, :, :, :, :done] for name, values in whole.values.items()}
+        alone = rows(sweeps.Swept(whole.design, done, first, UNITS, "a note"))
+        assert [against] == alone["Against doing nothing (baseline), on the same drives"]
+    if not done:
+        assert all(row[2:] == ("-", "-", "-") for row in told["filter"])
+
+
 def test_pairs_count_runs_and_weigh_seeds():
     found = swept()
     one = next(t for t in studies.tables(found) if t.title.startswith("filter against A"))
