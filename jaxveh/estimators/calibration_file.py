@@ -149,6 +149,8 @@ def _fit(content: dict[str, Any], start: Any, chosen: tuple[Parameter, ...]) -> 
         if not isinstance(rows[name], list) or len(rows[name]) != i + 1:
             raise InputError(f"[covariance]: {name}: must be a list of {i + 1} numbers.")
         half[i, : i + 1] = [_told_number(f"[covariance]: {name}", value) for value in rows[name]]
+    if not _is_positive(half):
+        raise InputError("[covariance]: is not positive definite: edited, or lost in rounding (float32); fit again.")
     values = [jnp.asarray(value, dtype) for value in numbers["value"]]
     result = kit.toml_text("result", content["result"])
     kit.check_known("the calibration", "result", result, Result.__members__)
@@ -163,6 +165,15 @@ def _fit(content: dict[str, Any], start: Any, chosen: tuple[Parameter, ...]) -> 
         model=put(start, chosen, values),
         chosen=chosen,
     )
+
+
+def _is_positive(half: np.ndarray) -> bool:
+    """Whether the matrix of this lower half is a covariance: the bands of an estimate take its root."""
+    try:
+        np.linalg.cholesky(half + np.tril(half, -1).T)
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 def _spans(logs: Any) -> tuple[Span, ...]:

@@ -6,6 +6,7 @@ there. A marked chunk is therefore complete, whenever a process was killed; a ch
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import warnings
@@ -34,6 +35,10 @@ LONGEST_ERROR = 1000
 """Bytes of UTF-8 of a chunk's error that are kept."""
 
 
+SHOWN = 200
+"""Characters of the error of a damaged store that are shown."""
+
+
 class Store:
     """A sweep's store at `path`, opened for reading and writing chunks."""
 
@@ -42,12 +47,16 @@ class Store:
         self.path = Path(path)
         if not (self.path / "zarr.json").exists():
             raise InputError(f"{self.path}: no such store: there is no zarr.json.")
-        self.group = zarr.open_group(self.path, mode="r+")
-        told = self.group.attrs.get(MANIFEST)
+        with self._told_if_damaged("zarr.json"):
+            self.group = zarr.open_group(self.path, mode="r+")
+            told = self.group.attrs.get(MANIFEST)
+            if told is not None:
+                self._read_identity(json.loads(told), json.loads(self.group.attrs[ABOUT]))
         if told is None:
             raise InputError(f"{self.path}: a Zarr store, but no sweep's: it does not have the attribute {MANIFEST}.")
-        self.identity: dict[str, Any] = json.loads(told)
-        self.about: dict[str, Any] = json.loads(self.group.attrs[ABOUT])
+
+    def _read_identity(self, identity: dict[str, Any], about: dict[str, Any]) -> None:
+        self.identity, self.about = identity, about
         axes = self.identity["design"]
         self.labels = {axis["name"]: tuple(axis["labels"]) for axis in axes}
         self.columns = {axis["name"]: axis.get("columns") for axis in axes}
@@ -58,6 +67,17 @@ class Store:
         self.plan = Plan(int(np.prod(choices, dtype=int)), shape, tuple(self.identity["batch"]))
         self._choices = tuple(choices)
         self._chosen = tuple(i for i, is_choice in enumerate(self.is_choice.values()) if is_choice)
+
+    @contextlib.contextmanager
+    def _told_if_damaged(self, what: str) -> Iterator[None]:
+        """Name the store and the part of it that cannot be read: files are cut by full disks and by copies that were stopped."""
+        try:
+            yield
+        except (AttributeError, KeyError, RuntimeError, TypeError, ValueError) as error:
+            words = " ".join(str(error).split())[:SHOWN]
+            raise InputError(
+                f"{self.path}: {what} is damaged ({words}). Restore the store, or remove it: the same sweep computes it again."
+            ) from error
 
     def design(self) -> Design:
         """The design, with labels instead of the objects to choose from."""
@@ -84,11 +104,13 @@ class Store:
 
     def read(self, name: str) -> np.ndarray:
         """All of one value: (axes..., seeds, ...)."""
-        return np.asarray(self.group[name][...])
+        with self._told_if_damaged(name):
+            return np.asarray(self.group[name][...])
 
     def status(self) -> np.ndarray:
         """The status of each chunk: 0 not done, 1 done, 2 failed."""
-        return np.asarray(self.group[STATUS][:])
+        with self._told_if_damaged(STATUS):
+            return np.asarray(self.group[STATUS][:])
 
     def is_done(self, number: int) -> bool:
         """Whether a chunk is done, by any process."""

@@ -353,6 +353,12 @@ def test_what_a_calibration_started_from_is_kept_options_included(name, tmp_path
         np.testing.assert_array_equal(a, b)
     assert (kept.told, kept.weight, kept.validation) == (made.told, made.weight, made.validation)
     assert jax.tree.structure(kept.model) == jax.tree.structure(made.model)
+    bad = dataclasses.replace(made, fit=dataclasses.replace(fit, covariance=spread - 2.0))
+    estimators.write_calibration(bad, path, overwrite=True)
+    with pytest.raises(
+        InputError, match=r"calibration.toml: \[covariance\]: is not positive definite: edited, or lost in"
+    ):
+        estimators.read_calibration(path)
     for other in (kit.start_of(case.vehicle), kit.start_of(case.car, {"a_x": jnp.ones(())})):
         with pytest.raises(InputError, match="did not start from a car's file"):
             estimators.write_calibration(dataclasses.replace(made, told=other), tmp_path / "never.toml")

@@ -4,10 +4,13 @@ import errno
 import itertools
 import json
 import os
+import random
+import re
 import shutil
 import subprocess
 import sys
 import threading
+import warnings
 from pathlib import Path
 
 import jax
@@ -61,6 +64,30 @@ def test_it_is_the_sweep_without_a_store(plain, whole):
     )
     with pytest.raises(InputError, match="value"):
         found["none"]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_store_with_a_damaged_file_is_told(tmp_path, whole, seed):
+    """Any file of a store cut anywhere, or with another content: it is read as it was, or its damage is named."""
+    draw = random.Random(seed)
+    path = tmp_path / "copy.zarr"
+    shutil.copytree(whole, path)
+    for file in draw.sample(sorted(f for f in path.rglob("*") if f.is_file()), 6):
+        sound = file.read_bytes()
+        for broken in (sound[: draw.randrange(len(sound))], b"", draw.randbytes(len(sound))):
+            file.write_bytes(broken)
+            told = None
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", JaxvehWarning)
+                    found = sweeps.read_sweep(path)
+                    read = {name: found[name] for name in found.values}
+                assert set(read) == set(sweeps.read_sweep(whole).values)
+            except InputError as error:
+                told = str(error)
+            assert told is None or re.search(r"copy\.zarr: .* is damaged \(.*the same sweep computes it again", told)
+        file.write_bytes(sound)
+    same_store(path, whole)
 
 
 def test_xarray_opens_it_with_names_and_coordinates(whole, plain, recwarn):
