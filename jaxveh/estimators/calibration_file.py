@@ -10,7 +10,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_finite
 from jaxveh._core.parameter import Parameter, put, resolve
 from jaxveh._core.parameters import Parameters
 from jaxveh._core.result import Result, code
@@ -42,6 +42,10 @@ NONE = "none"
 REFERENCE = ("weight", "validation")
 LOG = ("name", "start", "end")
 PARAMETER = ("value", "std", "unit", "line")
+
+
+ROUNDING = 1e-3
+"""The share by which a value and its line may differ, in float32 too."""
 
 
 def write_calibration(calibration: Calibration, path: str | os.PathLike, *, overwrite: bool = False) -> None:
@@ -144,6 +148,8 @@ def _fit(content: dict[str, Any], start: Any, chosen: tuple[Parameter, ...]) -> 
         key: [_told_number(f"[parameters.{name}]: {key}", _table(name, tables, PARAMETER).get(key)) for name in names]
         for key in ("value", "std", "line")
     }
+    for p, value, line in zip(chosen, numbers["value"], numbers["line"], strict=True):
+        _check_pair(p, value, line)
     half = np.zeros((len(names), len(names)))
     for i, name in enumerate(names):
         if not isinstance(rows[name], list) or len(rows[name]) != i + 1:
@@ -165,6 +171,22 @@ def _fit(content: dict[str, Any], start: Any, chosen: tuple[Parameter, ...]) -> 
         model=put(start, chosen, values),
         chosen=chosen,
     )
+
+
+def _check_pair(p: Parameter, value: float, line: float) -> None:
+    """Raise `InputError` unless a fitted value is in its domain and belongs to its line, on which the bands are: one of both
+    was edited otherwise."""
+    where = f"[parameters.{kit.toml_string(p.name)}]"
+    try:
+        check_finite("value", value)
+        found = float(p.domain.inverse(value))
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    if not abs(found - line) <= ROUNDING * (1 + abs(line)):
+        raise InputError(
+            f"{where}: value = {value:g}: must be {float(p.domain.forward(line)):g}, which belongs to line = {line:g}. A fitted "
+            "value cannot be edited alone: edit the car's file, and fit again."
+        )
 
 
 def _is_positive(half: np.ndarray) -> bool:

@@ -173,6 +173,11 @@ def read_property_file(path: str | Path) -> PropertyFile:
     single-byte encoding.
     """
     path = Path(path)
+    if path.suffix.lower() == ".toml":
+        raise InputError(
+            f"{path}: is TOML: must be a tyre property file (.tir). The parameter file of a law, as `jaxveh tyre fit "
+            "--model` writes it, is read by tyres.read_parameters, and is a --start of another fit."
+        )
     check_readable(path)
     # Bytes that are not UTF-8 (a degree sign in a comment) are written back unchanged.
     with open(path, encoding="utf-8", errors="surrogateescape", newline="") as file:

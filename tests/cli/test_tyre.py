@@ -97,6 +97,12 @@ def test_bad_files_are_named(table, tmp_path):
     other.write_text("nothing\n")
     assert "not a tyre property file" in error_line(run("tyre", "show", other))
     assert "cannot be read" in error_line(run("tyre", "show", tmp_path / "absent.tir"))
+    law = tmp_path / "brush.toml"
+    tyres.write_parameters(
+        tyres.Brush(slip_stiffness=1e5, cornering_stiffness=8e4, friction=1.0, half_length=0.06), law
+    )
+    for given in (("show", law), ("evaluate", law, table, "-o", tmp_path / "out.csv")):
+        assert "is TOML: must be a tyre property file (.tir)" in error_line(run("tyre", *given))
     assert "-o" in error_line(run("tyre", "evaluate", other, table, "-o", tmp_path / "out.txt"))
 
 

@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import inspect
+import re
 from types import ModuleType, SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -341,7 +342,8 @@ def test_what_a_calibration_started_from_is_kept_options_included(name, tmp_path
     start = one.model(case.car, **OPTIONS[name])
     chosen = resolve(start, one.chosen_parameters)
     values = [jnp.asarray(1.01 * value) for value in pick(start, chosen)]
-    z, by_name = jnp.stack(values), Parameters({p.name: v for p, v in zip(chosen, values, strict=True)})
+    z = jnp.stack([p.domain.inverse(v) for p, v in zip(chosen, values, strict=True)])
+    by_name = Parameters({p.name: v for p, v in zip(chosen, values, strict=True)})
     spread = jnp.eye(len(z)) + 0.1
     fit = fitting.Fit(by_name, by_name, z, spread, z[0], jnp.int32(3), jnp.int32(5), put(start, chosen, values), chosen)
     told = kit.start_of(case.car, OPTIONS[name])
@@ -359,6 +361,13 @@ def test_what_a_calibration_started_from_is_kept_options_included(name, tmp_path
         InputError, match=r"calibration.toml: \[covariance\]: is not positive definite: edited, or lost in"
     ):
         estimators.read_calibration(path)
+    for p, value in zip(chosen, values, strict=True):
+        for wrong in (np.nan, -3.0 * value - 1.0, 1e9):
+            one_wrong = Parameters({**by_name, p.name: jnp.asarray(wrong)})
+            bad = dataclasses.replace(made, fit=dataclasses.replace(fit, parameters=one_wrong))
+            estimators.write_calibration(bad, path, overwrite=True)
+            with pytest.raises(InputError, match=re.escape(f'toml: [parameters."{p.name}"]: value = ')):
+                estimators.read_calibration(path)
     for other in (kit.start_of(case.vehicle), kit.start_of(case.car, {"a_x": jnp.ones(())})):
         with pytest.raises(InputError, match="did not start from a car's file"):
             estimators.write_calibration(dataclasses.replace(made, told=other), tmp_path / "never.toml")
