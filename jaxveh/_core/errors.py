@@ -154,6 +154,9 @@ def float_array(value) -> Any:
     if isinstance(value, (jax.Array, np.ndarray, np.generic)) and np.issubdtype(value.dtype, np.floating):
         weak = getattr(value, "weak_type", False)
         return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float if weak else value.dtype))
+    if type(value) is int and abs(value) > LARGEST_SEED:
+        # No integer type holds it, and perhaps no float type either.
+        value = np.float64(value) if abs(value) < 10**300 else np.float64(np.inf)
     if eqx.is_array_like(value) and not _is_no_number(value):
         return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float))
     return value

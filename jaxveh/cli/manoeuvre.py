@@ -35,7 +35,8 @@ def parse_manoeuvre(
     """
     check_one_of("--manoeuvre", name, MANOEUVRES)
     # In the units of the options: the manoeuvre itself would tell of rad.
-    manoeuvres.kit.check_speed("--speed", speed)
+    if speed is not None:
+        manoeuvres.kit.check_speed("--speed", speed)
     manoeuvres.kit.check_steer_deg("--steer-deg", steer_deg)
     usual_speed, usual_steer = USUAL[name]
     options = {**options_of_car(name, car), **_settings(name, settings)}

@@ -84,7 +84,13 @@ def constant_speed(steer: jax.Array, speed: jax.Array) -> DriverInputs:
 
 def check_speed(name: str, speed) -> None:
     """Raise `InputError` unless a speed is between 0 and `FASTEST`."""
+    _check_given(name, speed)
     check(name, speed, lambda v: (v >= 0) & (v <= FASTEST), f"between 0 and {FASTEST:g} m/s")
+
+
+def _check_given(name: str, value) -> None:
+    if value is None:
+        raise InputError(f"{name} = None: must be a real number.")
 
 
 def check_steer_deg(name: str, steer_deg) -> None:
@@ -95,6 +101,7 @@ def check_steer_deg(name: str, steer_deg) -> None:
 def check_drive(speed, duration, steer=0.0) -> None:
     """Raise `InputError` unless speed, duration and steer are within their ranges."""
     check_speed("speed", speed)
+    _check_given("steer", steer)
     check("steer", steer, _below_a_quarter_turn, "within a quarter turn", _advice(speed, steer))
     check_positive("duration", duration, "s")
     if eqx.is_array(duration):
@@ -107,10 +114,15 @@ def _below_a_quarter_turn(angle) -> Any:
 
 def _advice(speed, steer) -> str:
     """Return what is probably wrong with a steer out of range: the unit, or the order of the arguments."""
-    numbers = [value for value in (speed, steer) if is_concrete(value) and jnp.ndim(value) == 0]
-    if len(numbers) == 2 and _below_a_quarter_turn(speed) and 0 <= steer <= FASTEST:
-        return "The speed comes first, then the steer; the steer is in rad, not degrees."
-    return "It is in rad, not degrees."
+    degrees = "It is in rad, not degrees."
+    if not is_concrete(speed, steer):
+        return degrees
+    try:
+        speed, steer = float(speed), float(steer)
+    except (OverflowError, TypeError, ValueError):
+        return degrees
+    swapped = _below_a_quarter_turn(speed) and 0 <= steer <= FASTEST
+    return "The speed comes first, then the steer; the steer is in rad, not degrees." if swapped else degrees
 
 
 def as_time(t: Any, like: jax.Array) -> jax.Array:

@@ -80,6 +80,7 @@ def steady_circle(
     """
     duration = start + time + 2.0 if duration is None else duration
     check_speed("from_speed", from_speed)
+    check_speed("to_speed", to_speed)
     check_drive(to_speed, duration)
     speed = ChangingSpeed(from_speed, to_speed, float(start), float(time))
     return PathDriver(path=Circle(radius), speed=speed, duration=float(duration), **driver)

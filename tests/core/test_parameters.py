@@ -1,14 +1,18 @@
 """`Parameters`: by name and as in the car, whole parts, one array, a pytree whose leaves have names."""
 
+import contextlib
 import copy
+import importlib
+import inspect
 import pickle
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import Parameters
+from jaxveh import InputError, Parameters
 
 FOUND = Parameters({"rear.B": 8.0, "front.tyre.B": 9.0, "front.tyre.D": 7e3, "table.0": 3.0, "mass": 1500.0})
 
@@ -58,3 +62,18 @@ def test_they_look_like_a_table():
         and lines[2].split() == ["rear.B", "8"]
         and lines[4].split() == ["front.tyre.D", "7000"]
     )
+
+
+@pytest.mark.parametrize("room", ["manoeuvres", "roads", "tyres"])
+@pytest.mark.parametrize("huge", [10**30, 10**400, -(10**400)], ids=["fits a float", "fits none", "negative"])
+def test_a_whole_number_that_no_type_holds_is_no_internal_error(room, huge):
+    module, made = importlib.import_module(f"jaxveh.{room}"), 0
+    for kind in (getattr(module, name) for name in module.__all__):
+        if not inspect.isclass(kind) or not issubclass(kind, eqx.Module) or inspect.isabstract(kind):
+            continue
+        needed = [p.name for p in inspect.signature(kind).parameters.values() if p.default is p.empty]
+        # Other objects, texts and NumPy's arrays are refused in words of their own.
+        with contextlib.suppress(InputError, TypeError, AttributeError):
+            made += 1
+            kind(**dict.fromkeys(needed, huge))
+    assert made > 3

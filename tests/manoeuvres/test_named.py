@@ -61,6 +61,17 @@ def test_no_law_of_speed_takes_a_speed_that_no_car_has():
         manoeuvres.steady_circle(from_speed=151.0)
 
 
+@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("wrong", [None, "fast", 1j, 10**400, object()], ids=lambda one: type(one).__name__)
+def test_what_is_no_number_is_refused(name, wrong):
+    given = inspect.signature(FUNCTIONS[name]).parameters
+    usual = {"speed": 20.0, "steer": 0.03, "key": jax.random.key(0)}
+    usual = {key: value for key, value in usual.items() if key in given}
+    for key in {"speed", "steer", "from_speed", "to_speed"} & set(given):
+        with pytest.raises(InputError, match=f"{key} = "):
+            FUNCTIONS[name](**{**usual, key: wrong})
+
+
 TURNED = [name for name, make in FUNCTIONS.items() if "steer" in inspect.signature(make).parameters]
 
 
