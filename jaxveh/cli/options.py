@@ -34,10 +34,16 @@ Channels = Annotated[
 ]
 
 Numbers = Annotated[
-    Path | None, typer.Option("--json", metavar="FILE", help="Write every number shown, with a manifest.")
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write every number shown, with a manifest; an old file is replaced."),
 ]
 
-Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write figures into this folder.")]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="DIR", help="Write figures into this folder; old ones of the same names are replaced."
+    ),
+]
 
 Force = Annotated[bool, typer.Option("--force", help="Let -o replace an existing file.")]
 
