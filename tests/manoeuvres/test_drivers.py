@@ -221,7 +221,7 @@ STEADY = manoeuvres.SteadySpeed(20.0)
         (lambda: PathDriver(path=3.0, speed=STEADY, duration=5.0), r"PathDriver\.path = float: must be a path"),
         (lambda: PathDriver(path=manoeuvres.Straight(), speed=20.0, duration=5.0), r"PathDriver\.speed = float"),
         (lambda: manoeuvres.iso_lane_change(preview_time=0.0), r"PathDriver\.preview_time = 0\.0: must be positive"),
-        (lambda: manoeuvres.steady_circle(40.0, -1.0), r"speed = -1\.0: must be at least 0\.0"),
+        (lambda: manoeuvres.steady_circle(40.0, -1.0), r"speed = -1\.0: must be between 0 and 150 m/s"),
     ],
 )
 def test_bad_input_raises_by_name_value_and_range(make, message):
