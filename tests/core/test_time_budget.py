@@ -100,8 +100,15 @@ def of_a_product(function, k, **indices):
     return item
 
 
+@pytest.fixture
+def large_products(tmp_path, monkeypatch):
+    """A record of which each product is too large to run whole."""
+    monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
+    time_budget.RECORD.write_text(json.dumps({f"a.py::f{k}": 1.01 * time_budget.LARGE for k in range(13)}))
+
+
 @pytest.mark.parametrize("many", [1, 2, 5, 6, 7, 30])
-def test_every_test_of_a_product_has_a_case(many):
+def test_every_test_of_a_product_has_a_case(many, large_products):
     """Whatever its number of cases, and whichever tests stand before it."""
     items = []
     for function in range(13):
@@ -119,13 +126,24 @@ def test_every_test_of_a_product_has_a_case(many):
 
 
 @pytest.mark.parametrize("function", range(6))
-def test_each_value_of_a_product_meets_a_sixth_of_the_others(function):
+def test_each_value_of_a_product_meets_a_sixth_of_the_others(function, large_products):
     items = [of_a_product(function, f"{i}-{j}", a=i, b=j, with_b=j) for i in range(12) for j in range(18)]
     time_budget.keep_one_colour(items)
     kept = [item.callspec.indices for item in items if not item.marks]
     assert len(kept) == 36
     assert [sum(one["a"] == i for one in kept) for i in range(12)] == [3] * 12
     assert [sum(one["b"] == j for one in kept) for j in range(18)] == [2] * 18
+
+
+@pytest.mark.parametrize(("seconds", "kept"), [(None, 40), (0.95, 40), (1.05, 7)])
+def test_of_a_small_product_all_cases_are_left_to_the_budget(seconds, kept, tmp_path, monkeypatch):
+    """What takes little, or is not on record because it takes less, runs as if it were no product."""
+    monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
+    record = {} if seconds is None else {"a.py::f0": seconds * time_budget.LARGE / 40}
+    time_budget.RECORD.write_text(json.dumps(record))
+    items = [of_a_product(0, k) for k in range(40)]
+    time_budget.keep_one_colour(items)
+    assert abs(sum(not item.marks for item in items) - kept) <= (kept < 40)
 
 
 def test_of_a_files_long_cases_the_quickest_run():
