@@ -29,7 +29,7 @@ BUDGET, LONGEST, LONG_BUDGET = 0.4, 2.0, 3.0
 
 What tests of a file share is taken by the first that runs: the record has the larger numbers of two selections."""
 
-LARGE = 2.0
+LARGE = 2 * BUDGET
 """Seconds of all cases of a `product` beyond which one in `COLOURS` runs. A smaller one has the budget of every function: its
 cases cost little, and each is often the only one that looks at its member's numbers."""
 

@@ -101,6 +101,7 @@ def test_a_good_file_gives_no_alarm(text):
     assert found(text) == []
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
