@@ -29,15 +29,11 @@ BUDGET, LONGEST, LONG_BUDGET = 0.4, 2.0, 3.0
 
 What tests of a file share is taken by the first that runs: the record has the larger numbers of two selections."""
 
-LARGE = 2 * BUDGET
-"""Seconds of all cases of a `product` beyond which one in `COLOURS` runs. A smaller one has the budget of every function: its
-cases cost little, and each is often the only one that looks at its member's numbers."""
-
 OUTLIER = 3.0
 """Times the median of its function's cases: a case that takes longer is on record by itself."""
 
 COLOURS = 6
-"""Of the cases of a `product` one in so many runs by default."""
+"""Of the cases of a `product` that together take longer than a budget one in so many runs by default."""
 
 RECORD = Path(__file__).parent / "recorded" / "seconds.json"
 
@@ -55,17 +51,17 @@ def function_of(nodeid):
 
 
 def keep_one_colour(items):
-    """Of a large `product` one case in six stays, the others are left to `-m full`: each value of a parameter meets a sixth of
-    the others', and each test has a sixth of the cases, as the fields of one colour on a board of six. The test's name decides
-    the colour: whatever stands beside it, the same cases run. Of few cases none may have the colour: then one of the next
-    colour stays, so that every test has a case."""
+    """Of a `product` beyond the budget one case in six stays, the others are left to `-m full`: each value of a parameter meets
+    a sixth of the others', and each test has a sixth of the cases, as the fields of one colour on a board of six. The test's
+    name decides the colour: whatever stands beside it, the same cases run. Of few cases none may have the colour: then one of
+    the next colour stays, so that every test has a case."""
     seconds, functions = json.loads(RECORD.read_text()), {}
     for item in items:
         if item.get_closest_marker("product") and hasattr(item, "callspec"):
             functions.setdefault(function_of(item.nodeid), []).append(item)
     for name, members in functions.items():
-        if seconds.get(name, 0.0) * len(members) <= LARGE:
-            continue
+        if seconds.get(name, 0.0) * len(members) <= BUDGET:
+            continue  # each is often the only one that looks at its member's numbers
         start = zlib.crc32(name.encode())
         # Names that are given together, `("quantity", "name")`, count once.
         places = set(zip(*(item.callspec.indices.values() for item in members), strict=True))

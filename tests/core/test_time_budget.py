@@ -101,14 +101,14 @@ def of_a_product(function, k, **indices):
 
 
 @pytest.fixture
-def large_products(tmp_path, monkeypatch):
-    """A record of which each product is too large to run whole."""
+def beyond_budget(tmp_path, monkeypatch):
+    """A record of products that take longer than a budget."""
     monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
-    time_budget.RECORD.write_text(json.dumps({f"a.py::f{k}": 1.01 * time_budget.LARGE for k in range(13)}))
+    time_budget.RECORD.write_text(json.dumps({f"a.py::f{k}": 1.01 * BUDGET for k in range(13)}))
 
 
 @pytest.mark.parametrize("many", [1, 2, 5, 6, 7, 30])
-def test_every_test_of_a_product_has_a_case(many, large_products):
+def test_every_test_of_a_product_has_a_case(many, beyond_budget):
     """Whatever its number of cases, and whichever tests stand before it."""
     items = []
     for function in range(13):
@@ -126,7 +126,7 @@ def test_every_test_of_a_product_has_a_case(many, large_products):
 
 
 @pytest.mark.parametrize("function", range(6))
-def test_each_value_of_a_product_meets_a_sixth_of_the_others(function, large_products):
+def test_each_value_of_a_product_meets_a_sixth_of_the_others(function, beyond_budget):
     items = [of_a_product(function, f"{i}-{j}", a=i, b=j, with_b=j) for i in range(12) for j in range(18)]
     time_budget.keep_one_colour(items)
     kept = [item.callspec.indices for item in items if not item.marks]
@@ -136,10 +136,10 @@ def test_each_value_of_a_product_meets_a_sixth_of_the_others(function, large_pro
 
 
 @pytest.mark.parametrize(("seconds", "kept"), [(None, 40), (0.95, 40), (1.05, 7)])
-def test_of_a_small_product_all_cases_are_left_to_the_budget(seconds, kept, tmp_path, monkeypatch):
+def test_a_product_within_its_budget_runs_whole(seconds, kept, tmp_path, monkeypatch):
     """What takes little, or is not on record because it takes less, runs as if it were no product."""
     monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
-    record = {} if seconds is None else {"a.py::f0": seconds * time_budget.LARGE / 40}
+    record = {} if seconds is None else {"a.py::f0": seconds * BUDGET / 40}
     time_budget.RECORD.write_text(json.dumps(record))
     items = [of_a_product(0, k) for k in range(40)]
     time_budget.keep_one_colour(items)
