@@ -85,11 +85,10 @@ def simulate(
     **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened as the fastest motion
     requires (a sensor's low-pass, the driver, a crawl). For a car whose wheels turn it takes `statespace.StabilisedRK4`, whose
     steps of at most 2 ms hold the wheels' spins to standstill. Where steps would be too short, it takes Kvaerno's implicit
-    method. Under jit, vmap or grad the fastest motion is not known: the stabilised method then holds whatever this kind of car
-    can do.
-    "explicit" (RK4) and "implicit" are always obeyed: above 5 m/s "explicit" is enough for a car whose wheels turn, and twice as
-    fast. Outside jit a warning says where equal steps were too long for the motion. A diffrax solver takes equal steps, or its
-    own with a `stepsize_controller`.
+    method. Under jit, vmap or grad the fastest motion is not known: the steps then hold whatever this kind of car can do, those
+    of RK4 at most 2.5 ms. "explicit" (RK4) and "implicit" are always obeyed: above 5 m/s "explicit" is enough for a car whose
+    wheels turn, and twice as fast. Outside jit a warning says where equal steps were too long for the motion. A diffrax solver
+    takes equal steps, or its own with a `stepsize_controller`.
 
     `adjoint`: diffrax's way to differentiate; the default serves reverse mode, and also forward mode with equal steps and no
     event (otherwise `diffrax.ForwardMode()`). `progress` gets the share done (single runs). All of it may be jitted, vmapped over

@@ -181,12 +181,11 @@ def explicit(max_step: float) -> SolverChoice:
 def blind_choice(driven: Driven, max_step: float) -> SolverChoice:
     """The choice where no number is known, as under jit, vmap or grad: it holds the fastest motion that this kind of car can
     have, with steps of at most `max_step` (s)."""
-    pole = FAST_POLE if has_fast_states(driven.car.vehicle) else SLOW_POLE
     sensors = driven.car.sensors
     filtered = sensors is not None and sensors.low_pass is not None
-    if pole * max_step <= LIMIT and not filtered and driven.driver.fastest_rate is not None:
-        return explicit(max_step)
-    return SolverChoice(StabilisedRK4(), None, min(max_step, STABILISED / pole))
+    if has_fast_states(driven.car.vehicle) or filtered or driven.driver.fastest_rate is None:
+        return SolverChoice(StabilisedRK4(), None, min(max_step, STABILISED / FAST_POLE))
+    return explicit(min(max_step, STABLE / SLOW_POLE))
 
 
 def implicit(max_step: float, rtol: float = 1e-6, atol: float = 1e-7) -> SolverChoice:
