@@ -24,7 +24,7 @@ from pathlib import Path
 
 import pytest
 
-BUDGET, LONGEST, LONG_BUDGET = 0.4, 2.0, 3.0
+BUDGET, LONGEST, LONG_BUDGET = 0.6, 2.0, 3.0
 """Seconds a test function, a case, and a file's long cases, on a slow machine of two cores; a quick one takes 0.4 of them.
 
 What tests of a file share is taken by the first that runs: the record has the larger numbers of two selections."""
