@@ -79,7 +79,7 @@ def state_space(
       the sideslip of a car that has one.
     - `solver`, `steps`: fixed steps between two rows, by default one of `statespace.RK4`, or of `statespace.StabilisedRK4` if the
       car's wheels turn. A car whose speed is given needs more `steps`, or that solver, where rows are far apart and the car is
-      slow: at 10 Hz below 6 m/s, at 25 Hz below 2.5 m/s. `input_path`: inputs `held` over a step or `linear`.
+      slow: at 10 Hz below 6 m/s, at 25 Hz below 2.5 m/s (`run` warns). `input_path`: inputs `held` over a step or `linear`.
     - A measured `yaw` or `course` may be given modulo a whole turn (within -pi to pi): their innovations wrap.
 
     The estimate's fields are the states, then `report`, then the parameters (`front_B`), in physical units.

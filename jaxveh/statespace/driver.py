@@ -24,6 +24,7 @@ from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result, first_failure
 from jaxveh.statespace.belief import Info
 from jaxveh.statespace.contract import KEPT, AbstractFilter, check_told, who_lacks
+from jaxveh.statespace.far_rows import warn_of_far_rows
 from jaxveh.statespace.model import Row, StateSpace
 from jaxveh.statespace.parameters import parameters_of
 
@@ -94,17 +95,19 @@ def run(
     checkpointed. Inside jit the checks are skipped, and failures are left in `result`.
 
     **Raises** `InputError` if model, filter and recording do not match; `FilterError` with step, time and
-    reason if the filter failed, and **warns** (`JaxvehWarning`) if it went on but has remarks on rows (`info.remark`),
-    unless `throw=False`.
+    reason if the filter failed, and **warns** (`JaxvehWarning`) if it went on but has remarks on rows (`info.remark`), and if
+    rows are too far apart for the steps between them, unless `throw=False`.
     """
     model = strong(model)
     check_told(filter, model)
     filter.check(model)
     note_function("run: transition", model.transition_function)
     note_function("run: observation", model.observation_function)
-    estimate = scan(filter, model, model.rows(recording), key, as_names(keep))
+    rows = model.rows(recording)
+    estimate = scan(filter, model, rows, key, as_names(keep))
     estimate = dataclasses.replace(estimate, time=recording.time)
     if throw:
+        warn_of_far_rows(model, rows)
         raise_failure(estimate, filter, model, recording)
         warn_of_remarks(estimate, filter)
     return estimate

@@ -40,7 +40,7 @@ class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
 
     Loads follow `load_transfer`. Slips are those of `wheels.contact`. Brakes and rolling resistance change sign smoothly below
     0.94 m/s (`wheels.STANDSTILL`), so that standstill is a regular point. The spins are stiff: their poles are about
-    `-C_x r_e^2 / (J_w |v|)`, 200 1/s at 20 m/s and thousands at walking speed, from which `simulate` chooses its solver.
+    `-C_x r_e^2 / (J_w |v|)`, 200 1/s at 20 m/s and thousands at walking speed, for which there is `statespace.StabilisedRK4`.
 
     **Parameters**: `wheel_inertia` (kg m^2, of one wheel).
 
