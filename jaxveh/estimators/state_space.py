@@ -29,7 +29,7 @@ from jaxveh.statespace import (
     with_parameters,
 )
 from jaxveh.vehicles import AbstractVehicle
-from jaxveh.vehicles.kit import has_fast_states
+from jaxveh.vehicles import kit as vehicles_kit
 
 TOLD_SPEED = "v_x"
 """The speed: an input of some cars, and a state of others."""
@@ -69,29 +69,26 @@ def state_space(
     - `process_noise`: standard deviations by state in unit per root second (default `PROCESS_NOISE`, for the states the
       car has), or a `Continuous` or `Discrete` law. `start`, `start_spread`: mean and standard deviation of the start state.
     - A car whose speed is a state (`SevenDOF`, `TwoTrack3DOF`, ... under torques) needs `start={"v_x": ...}` (m/s), the speed
-      in the first row, and starts straight ahead with rolling wheels. If its wheels turn, their spins decay fast: with rows
-      0.01 s apart one step of `statespace.StabilisedRK4` suffices from 3 m/s on; lower speeds or longer intervals need more
-      `steps` (4 hold standstill).
+      in the first row, and starts straight ahead with rolling wheels.
     - `measurement_noise`: another noise law than the sensors' own (say, a `StateDependent` one that grows with slip).
     - `minimum_speed` (m/s): below it all states of a car whose speed is the input `v_x` are held (`held_rows` returns where): a
       single track has no steady slip angle at standstill. The states of a car whose speed is a state are never held.
     - `report`: outputs of the car to show in addition to its states, such as `sideslip`, `F_yf`, `slip_angle_front`; by default
       the sideslip of a car that has one.
-    - `solver`, `steps`: fixed steps between two rows, by default one of `statespace.RK4`, or of `statespace.StabilisedRK4` if the
-      car's wheels turn. A car whose speed is given needs more `steps`, or that solver, where rows are far apart and the car is
-      slow: at 10 Hz below 6 m/s, at 25 Hz below 2.5 m/s (`run` warns). `input_path`: inputs `held` over a step or `linear`.
+    - `solver`, `steps`: fixed steps between two rows, by default one of `statespace.RK4`: at 10 Hz it holds from 6 m/s on, at
+      25 Hz from 2.5 m/s on (`run` warns). If the car's wheels turn it is one of `statespace.StabilisedRK4`, which at 100 Hz
+      holds from 3 m/s on, four steps at standstill too. `input_path`: inputs `held` over a step or `linear`.
     - A measured `yaw` or `course` may be given modulo a whole turn (within -pi to pi): their innovations wrap.
 
     The estimate's fields are the states, then `report`, then the parameters (`front_B`), in physical units.
-    **Raises** `InputError` for unknown names, standard deviations that are not positive, sensors that are no `SensorSet` or
-    measure quantities that the car does not have.
+    **Raises** `InputError` for unknown names, standard deviations that are not positive, and sensors that do not fit.
     """
     check_at_least("steps", steps, 1)
     check_at_least("minimum_speed", minimum_speed, 0)
     _check_kinds(car, sensors, estimate)
     system = Instrumented(strong(car), _without_noise(sensors))
     states = system.state_type._fields
-    usual = StabilisedRK4() if has_fast_states(car) else RK4()
+    usual = StabilisedRK4() if vehicles_kit.has_fast_states(car) else RK4()
     transition = Propagate(_derivatives, solver or usual, steps)
     model = StateSpace(
         system=system,
@@ -105,9 +102,8 @@ def state_space(
         input_path=input_path,
         angles=tuple(name for name in sensors.channels if name in DIRECTIONS),
     )
-    if estimate is None:
-        return model
-    return with_parameters(model, lambda model: estimate(model.system.vehicle), prior, walk, domain=domain)
+    chosen = lambda model: estimate(model.system.vehicle)
+    return model if estimate is None else with_parameters(model, chosen, prior, walk, domain=domain)
 
 
 def _derivatives(system: Instrumented, t, x, u):

@@ -19,7 +19,7 @@ from jaxveh.io.optional import require
 from jaxveh.io.units import is_unit, same_unit
 
 MISSING = ["-", "--", "---", "#NV", "n.a."]
-"""Cells without a value, beside those that pandas knows (empty, `NA`, `NaN`, `null`, `#N/A`, ...)."""
+"""Cells without a value, beside those that pandas knows (empty, NA, NaN, null, #N/A, ...)."""
 
 
 def open_csv(path: Path, channels: ChannelMap | None) -> TableLog:

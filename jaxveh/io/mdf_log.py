@@ -78,7 +78,7 @@ class MdfLog(Log):
 def _of_words(raw: Any) -> Any:
     """Return a signal whose samples are all words: as its raw numbers, or missing if its other values are measurements.
 
-    `SNA` at 255 is no measurement in a channel that is linear elsewhere; `off` and `on` at 0 and 1 are their numbers.
+    SNA at 255 is no measurement in a channel that is linear elsewhere; `off` and `on` at 0 and 1 are their numbers.
     """
     parts = (raw.conversion.referenced_blocks or {}).values()
     if any(hasattr(part, "conversion_type") for part in parts):

@@ -35,7 +35,7 @@ _PREFIXED = {
     "newton": ("kilo", "mega", "deca"), "pascal": ("hecto", "kilo", "mega"), "bar": ("milli",), "joule": ("kilo",),
     "radian": ("milli", "micro"), "degree": ("milli",), "standard_gravity": ("milli",), "hertz": ("kilo", "mega"),
 }  # fmt: skip
-"""The prefixes with which a unit is in use. pint puts any prefix in front of any unit: `Grad` would be a gigaradian."""
+"""The prefixes with which a unit is in use. pint puts any prefix in front of any unit: Grad would be a gigaradian."""
 
 _QUANTITIES = ("m/s", "rad", "rad/s", "m/s^2", "m", "N", "N*m", "Pa", "1")
 _LETTERS = ("s", "m", "g", "G", "N", "°", "%")
@@ -90,7 +90,7 @@ def convert(values, unit: str, target: str, what: str) -> np.ndarray:
 
 @functools.cache
 def is_unit_name(text: str) -> bool:
-    """Whether a text in the place of a unit is one of a channel's, such as `km/h`; not `GPS`, `max` or `l` for left."""
+    """Whether a text in the place of a unit is one of a channel's, such as `km/h`; not GPS, max or l for left."""
     if len(text) == 1 and text not in _LETTERS:
         return False
     if text in _TIMES or _GRAD.match(text):

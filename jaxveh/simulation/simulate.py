@@ -72,15 +72,14 @@ def simulate(
     """Drive `car` through `manoeuvre` and record it: rows at 0, dt, 2 dt, ... up to the manoeuvre's duration.
 
     **The drive**: `manoeuvre` is open-loop, or a driver who sees the car. If the car has an engine and brakes and the manoeuvre
-    gives a speed but no pedals, a driver holds that speed (`manoeuvres.SpeedControl`). `road` (`jaxveh.roads`) has friction and
-    slopes along the way (None: level). `start`: state fields that differ from straight running, by name (`{"yaw": 0.05}`), also
-    the world position `x`, `y`. `until`: an event that ends the simulation early (`simulation.standstill()`); later rows are cut
-    off.
+    gives only a speed, a driver holds it (`manoeuvres.SpeedControl`). `road` (`jaxveh.roads`) has friction and slopes along the
+    way (None: level). `start`: state fields that differ from straight running, by name (`{"yaw": 0.05}`), also the world position
+    `x`, `y`. `until`: an event that ends it (`simulation.standstill()`); later rows are cut off.
 
     **Channels** with a `SensorSet` (or without sensors): each measured channel by its name, with the sensors' noise, and the
     car's inputs (`steer`, `v_x`, ...), exact unless the sensors measure them. With a `Suite` of devices (or one device): their
-    measurements at the instants when they arrive (rows at these instants instead of every `dt`; NaN where a device has none). In
-    both cases every output of the car as truth, `true.<name>`. `key` draws all randomness; without a key there is none.
+    measurements at the instants when they arrive (rows at these instead of every `dt`; NaN where a device has none). In both
+    cases every output of the car as truth, `true.<name>`. `key` draws all randomness; without a key there is none.
 
     **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened as the fastest motion
     requires (a sensor's low-pass, the driver, a crawl). For a car whose wheels turn it takes `statespace.StabilisedRK4`, whose
@@ -88,26 +87,19 @@ def simulate(
     method. Under jit, vmap or grad the fastest motion is not known: the steps then hold whatever this kind of car can do, those
     of RK4 at most 2.5 ms. "explicit" (RK4) and "implicit" are always obeyed: above 5 m/s "explicit" is enough for a car whose
     wheels turn, and twice as fast. Outside jit a warning says where equal steps were too long for the motion. A diffrax solver
-    takes equal steps, or its own with a `stepsize_controller`.
-
-    `adjoint`: diffrax's way to differentiate; the default serves reverse mode, and also forward mode with equal steps and no
-    event (otherwise `diffrax.ForwardMode()`). `progress` gets the share done (single runs). All of it may be jitted, vmapped over
-    keys, cars and manoeuvres, and differentiated by any of their leaves.
+    takes equal steps, or its own with a `stepsize_controller`. `adjoint`: diffrax's way to differentiate; the default serves
+    reverse mode, and also forward mode with equal steps and no event (otherwise `diffrax.ForwardMode()`). `progress` gets the
+    share done (single runs). All may be jitted, vmapped over keys, cars and manoeuvres, and differentiated.
 
     **Raises** `InputError` for arguments out of range, sensors or an event of a wrong type, a manoeuvre without an input that the
     car needs, rows that coincide in the car's dtype; `FilterError`, with time, state and a remedy, if the motion does not stay
-    finite. The latter needs `throw=True` and runs on the host; under jit check the channels.
+    finite (with `throw`, and not under jit: check the channels there).
     """
     sensors = _suite_of(sensors)
-    _check_event(until)
-    if key is not None:
-        check_key("simulate", key)
+    _check_asked(until, key)
     driven = driven_car(car, manoeuvre, sensors if isinstance(sensors, SensorSet) else None, road)
-    duration, values = driven.driver.duration, {} if start is None else as_mapping(start, "start")
-    for name, value in values.items():
-        if np.ndim(value) > 0:
-            raise InputError(f"simulate: start: {name} has shape {np.shape(value)}: must be one number. {SEVERAL}")
-    rows = None if not isinstance(sensors, Suite) else device_rows(sensors, duration)
+    duration, values = driven.driver.duration, _start_values(start)
+    rows = device_rows(sensors, duration) if isinstance(sensors, Suite) else None
     grid = lambda step: even_grid(duration, dt, step) if rows is None else grid_through(rows, step)
     times = grid(max_step).rows
     with meter_for(progress) as meter:
@@ -116,9 +108,18 @@ def simulate(
     if throw:
         _check_finished(found, times)
     source = f"simulation: {vehicle_name(car)}, {driver_name(driven.driver)}"
-    if not isinstance(sensors, Suite):
-        return _cut(_recording(driven, found, times, key, source), np.arange(len(times)), found, until)
-    return _cut(*_devices(driven, found, times, sensors, duration, key, source), found, until)
+    if isinstance(sensors, Suite):
+        return _cut(*_devices(driven, found, times, sensors, duration, key, source), found, until)
+    return _cut(_recording(driven, found, times, key, source), np.arange(len(times)), found, until)
+
+
+def _start_values(start: Any) -> Mapping[str, Any]:
+    """The given fields of the start state. Raises `InputError` for one that is no single number."""
+    values = {} if start is None else as_mapping(start, "start")
+    for name, value in values.items():
+        if np.ndim(value) > 0:
+            raise InputError(f"simulate: start: {name} has shape {np.shape(value)}: must be one number. {SEVERAL}")
+    return values
 
 
 def _suite_of(sensors: Any) -> SensorSet | Suite | None:
@@ -133,7 +134,9 @@ def _suite_of(sensors: Any) -> SensorSet | Suite | None:
     )
 
 
-def _check_event(until: Any) -> None:
+def _check_asked(until: Any, key: Any) -> None:
+    if key is not None:
+        check_key("simulate", key)
     if not (until is None or isinstance(until, Event)):
         raise InputError(
             f"simulate: until = {_describe(until)}: must be an Event such as simulation.standstill() (called), or None."

@@ -16,7 +16,7 @@ from jax.flatten_util import ravel_pytree
 from jaxveh.sensors import Instrumented
 from jaxveh.simulation.driven import Driven, DrivenState, dtype_of
 from jaxveh.statespace import Heun, RolledRK4, StabilisedRK4
-from jaxveh.vehicles.kit import has_fast_states
+from jaxveh.vehicles import kit
 
 STABLE = 2.5
 """Step times fastest pole up to which RK4 decays with it; its limit is 2.79 on the real and 2.83 on the imaginary axis."""
@@ -119,7 +119,7 @@ def sensors_pole(driven: Driven) -> Any:
 def may_be_stiff(driven: Driven, max_step: float) -> bool:
     """Whether steps of `max_step` (s) may be too long for RK4: the car has fast states, or its sensors or its driver are fast."""
     rate = driven.driver.fastest_rate
-    if rate is None or has_fast_states(driven.car.vehicle):
+    if rate is None or kit.has_fast_states(driven.car.vehicle):
         return True
     # The driver's rate is approximate, and includes the response of the car.
     known = max(SLOW_POLE, float(np.max(sensors_pole(driven))), 2.0 * float(np.max(rate)))
@@ -183,7 +183,7 @@ def blind_choice(driven: Driven, max_step: float) -> SolverChoice:
     have, with steps of at most `max_step` (s)."""
     sensors = driven.car.sensors
     filtered = sensors is not None and sensors.low_pass is not None
-    if has_fast_states(driven.car.vehicle) or filtered or driven.driver.fastest_rate is None:
+    if kit.has_fast_states(driven.car.vehicle) or filtered or driven.driver.fastest_rate is None:
         return SolverChoice(StabilisedRK4(), None, min(max_step, STABILISED / FAST_POLE))
     return explicit(min(max_step, STABLE / SLOW_POLE))
 
@@ -196,7 +196,7 @@ def implicit(max_step: float, rtol: float = 1e-6, atol: float = 1e-7) -> SolverC
 def first_choice(driven: Driven, values: dict, times: np.ndarray, max_step: float) -> SolverChoice:
     """The choice for known numbers. For a car whose wheels turn it is the blind one: a drive to standstill then needs one
     program, where RK4, chosen by the start, would need another with shorter steps. For every other car the start decides."""
-    if has_fast_states(driven.car.vehicle) and not float(np.max(sensors_pole(driven))) * max_step > LIMIT:
+    if kit.has_fast_states(driven.car.vehicle) and not float(np.max(sensors_pole(driven))) * max_step > LIMIT:
         return blind_choice(driven, max_step)
     return choose(at_start(driven, values, times), max_step)
 

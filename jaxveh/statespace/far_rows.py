@@ -70,7 +70,7 @@ def _sample(rows: Row) -> np.ndarray:
 
 def _largest(slopes: np.ndarray) -> np.ndarray:
     """The size of the largest eigenvalue of each matrix (k, n, n); 0 for one that is not finite."""
-    finite = np.isfinite(slopes).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(slopes).all(axis=(1, 2)))
     return np.abs(np.linalg.eigvals(np.where(finite[:, None, None], slopes, 0.0))).max(axis=1)
 
 
