@@ -10,6 +10,8 @@ import pytest
 
 import jaxveh
 
+pytestmark = pytest.mark.whole
+
 ROOT = pathlib.Path(jaxveh.__file__).parent
 ROOMS = sorted({path.relative_to(ROOT).parts[0] for path in ROOT.rglob("*.py") if path.parent != ROOT})
 ELSEWHERE = {

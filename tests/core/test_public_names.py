@@ -9,6 +9,8 @@ import pytest
 
 import jaxveh
 
+pytestmark = pytest.mark.whole
+
 ROOT = pathlib.Path(jaxveh.__file__).parent
 ROOMS = sorted(path.parent.name for path in ROOT.glob("*/__init__.py") if path.parent.name != "_core")
 KITS = sorted(path.parent.name for path in ROOT.glob("*/kit.py"))

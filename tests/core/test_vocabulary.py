@@ -9,6 +9,8 @@ import re
 import pytest
 from test_names_in_docstrings import ROOMS, ROOT, everywhere, exists, trees
 
+pytestmark = pytest.mark.whole
+
 TOP = ROOT.parent
 PAGES = sorted((TOP / "notebooks").rglob("*.md"))
 IRREGULAR = {

@@ -89,6 +89,7 @@ def uses():
     return reference.usages({place: path.read_text() for place, path in sources().items()})
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("module", ENTRIES)
 def test_every_public_name_has_an_example(module):
     lacking = [entry.short for entry in ENTRIES[module] if not reference.has_example(entry, uses())]
