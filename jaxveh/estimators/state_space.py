@@ -88,8 +88,8 @@ def state_space(
     _check_kinds(car, sensors, estimate)
     system = Instrumented(strong(car), _without_noise(sensors))
     states = system.state_type._fields
-    usual = StabilisedRK4() if vehicles_kit.has_fast_states(car) else RK4()
-    transition = Propagate(_derivatives, solver or usual, steps)
+    solver = solver or (StabilisedRK4() if vehicles_kit.has_fast_states(car) else RK4())
+    transition = Propagate(_derivatives, solver, steps)
     model = StateSpace(
         system=system,
         transition=HeldBelow(transition, minimum_speed) if TOLD_SPEED in system.inputs else transition,
@@ -102,8 +102,9 @@ def state_space(
         input_path=input_path,
         angles=tuple(name for name in sensors.channels if name in DIRECTIONS),
     )
-    chosen = lambda model: estimate(model.system.vehicle)
-    return model if estimate is None else with_parameters(model, chosen, prior, walk, domain=domain)
+    if estimate is None:
+        return model
+    return with_parameters(model, lambda model: estimate(model.system.vehicle), prior, walk, domain=domain)
 
 
 def _derivatives(system: Instrumented, t, x, u):
