@@ -73,8 +73,7 @@ def state_space(
     - `measurement_noise`: another noise law than the sensors' own (say, a `StateDependent` one that grows with slip).
     - `minimum_speed` (m/s): below it all states of a car whose speed is the input `v_x` are held (`held_rows` returns where): a
       single track has no steady slip angle at standstill. The states of a car whose speed is a state are never held.
-    - `report`: outputs of the car to show in addition to its states, such as `sideslip`, `F_yf`, `slip_angle_front`; by default
-      the sideslip of a car that has one.
+    - `report`: outputs of the car to show beside its states, such as `F_yf`; by default the sideslip of a car that has one.
     - `solver`, `steps`: fixed steps between two rows, by default one of `statespace.RK4`: at 10 Hz it holds from 6 m/s on, at
       25 Hz from 2.5 m/s on (`run` warns). If the car's wheels turn it is one of `statespace.StabilisedRK4`, which at 100 Hz
       holds from 3 m/s on, four steps at standstill too. `input_path`: inputs `held` over a step or `linear`.
@@ -88,8 +87,8 @@ def state_space(
     _check_kinds(car, sensors, estimate)
     system = Instrumented(strong(car), _without_noise(sensors))
     states = system.state_type._fields
-    solver = solver or (StabilisedRK4() if vehicles_kit.has_fast_states(car) else RK4())
-    transition = Propagate(_derivatives, solver, steps)
+    usual = StabilisedRK4() if vehicles_kit.has_fast_states(car) else RK4()
+    transition = Propagate(_derivatives, solver or usual, steps)
     model = StateSpace(
         system=system,
         transition=HeldBelow(transition, minimum_speed) if TOLD_SPEED in system.inputs else transition,
