@@ -29,14 +29,14 @@ SHARES = (0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
 def warn_of_far_rows(model: StateSpace, rows: Row) -> None:
     """Warn if the explicit steps from row to row (`Propagate`) multiply errors, as they do where they are too long.
 
-    Looked at are rows with small, usual and large inputs, at the prior's mean.
+    Looked at are rows before short, usual and long steps, and rows with small, usual and large inputs, at the prior's mean.
     """
     if len(rows.t) < 2 or not _integrates(model.transition_function) or not is_concrete(model, rows):
         return
     times = np.asarray(rows.t, float)
-    if np.median(np.diff(times)) <= FAR:
+    if np.max(np.diff(times)) <= FAR:
         return
-    some = _sample(rows)
+    some = _sample(np.diff(times), rows.u)
     at = jax.tree.map(lambda leaf: leaf[some], rows.u)
     growth = _largest(np.asarray(_slopes(model, rows.t[some], rows.t[some + 1], at), float))
     worst = int(np.argmax(growth))
@@ -45,7 +45,7 @@ def warn_of_far_rows(model: StateSpace, rows: Row) -> None:
         warnings.warn(
             f"run: rows {step:.3g} s apart are too far for one step at t = {times[some[worst]]:g} s: it multiplies errors by "
             f"{growth[worst]:.3g}, and the estimate may be wrong there. Take more steps between rows, e.g. "
-            "state_space(..., steps=4), or solver=statespace.StabilisedRK4().",
+            "state_space(..., steps=4), or solver=statespace.StabilisedRK4(); split the recording at a gap.",
             JaxvehWarning,
             stacklevel=3,
         )
@@ -60,11 +60,10 @@ def _integrates(function: Any) -> bool:
     return True
 
 
-def _sample(rows: Row) -> np.ndarray:
-    """Rows of small to large inputs, but not the last one: always equally many, for one program."""
-    count = len(rows.t) - 1
-    places = np.array([round(share * (count - 1)) for share in SHARES])
-    sizes = [np.abs(np.asarray(leaf)[:count]) for leaf in jax.tree.leaves(rows.u)]
+def _sample(steps: np.ndarray, u: Any) -> np.ndarray:
+    """Rows, but not the last one, whose step or an input is small to large: always equally many, for one program."""
+    places = np.array([round(share * (len(steps) - 1)) for share in SHARES])
+    sizes = [steps, *(np.abs(np.asarray(leaf)[: len(steps)]) for leaf in jax.tree.leaves(u))]
     return np.concatenate([places, *(np.argsort(size, kind="stable")[places] for size in sizes)])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import diffrax
@@ -70,6 +70,18 @@ class RK4(AbstractOneStep):
         return numerics.fence(y1)
 
 
+def stages_in_a_loop(stage: Callable, carry: tuple, *columns: Sequence[float]) -> tuple:
+    """`carry = stage(carry, *numbers)` for each stage of a method, whose numbers are the columns' rows: one stage's program, and
+    for reverse mode only the carries are kept."""
+    dtype = jnp.result_type(*jax.tree.leaves(carry))
+
+    @functools.partial(jax.checkpoint, prevent_cse=False)
+    def one(carry, numbers):
+        return stage(carry, *numbers), None
+
+    return jax.lax.scan(one, carry, tuple(jnp.asarray(column, dtype) for column in columns))[0]
+
+
 class RolledRK4(AbstractOneStep):
     """The same method as `RK4` with its four stages in a loop: a quarter of the program's size.
 
@@ -83,19 +95,15 @@ class RolledRK4(AbstractOneStep):
 
     def end(self, terms, t0, t1, y0, args):
         dt = terms.contr(t0, t1)
-        dtype = jnp.result_type(*jax.tree.leaves(y0))
 
-        @functools.partial(jax.checkpoint, prevent_cse=False)
-        def stage(carry, given):
+        def stage(carry, reach, weight):
             k, y1 = carry
-            reach, weight = given
             y = jax.tree.map(lambda y, d: y + reach * d, y0, k)
             k = numerics.fence(terms.vf_prod(t0 + reach * (t1 - t0), y, args, dt), firm=True)
-            return (k, jax.tree.map(lambda y, d: y + weight * d, y1, k)), None
+            return k, jax.tree.map(lambda y, d: y + weight * d, y1, k)
 
-        reaches, weights = jnp.array([0, 0.5, 0.5, 1], dtype), jnp.array([1 / 6, 1 / 3, 1 / 3, 1 / 6], dtype)
-        (_, y1), _ = jax.lax.scan(stage, (jax.tree.map(jnp.zeros_like, y0), y0), (reaches, weights))
-        return y1
+        none = jax.tree.map(jnp.zeros_like, y0)
+        return stages_in_a_loop(stage, (none, y0), (0, 0.5, 0.5, 1), (1 / 6, 1 / 3, 1 / 3, 1 / 6))[1]
 
 
 class Heun(AbstractOneStep):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import ClassVar
 
 import jax
@@ -10,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh.statespace.solvers import AbstractOneStep
+from jaxveh.statespace.solvers import AbstractOneStep, stages_in_a_loop
 
 CARRIED = (
     *(0.0, -0.408052303763775, -0.8874180141432417, -1.2630259792870244),
@@ -54,16 +53,12 @@ class StabilisedRK4(AbstractOneStep):
 
     def end(self, terms, t0, t1, y0, args):
         dt = terms.contr(t0, t1)
-        dtype = jnp.result_type(*jax.tree.leaves(y0))
 
-        @functools.partial(jax.checkpoint, prevent_cse=False)
-        def stage(carry, given):
+        def stage(carry, reach, kept, weight):
             y, dy = carry
-            reach, kept, weight = given
             k = numerics.fence(terms.vf_prod(t0 + reach * (t1 - t0), y, args, dt), firm=True)
             dy = jax.tree.map(lambda d, k: kept * d + k, dy, k)
-            return (jax.tree.map(lambda y, d: y + weight * d, y, dy), dy), None
+            return jax.tree.map(lambda y, d: y + weight * d, y, dy), dy
 
-        stages = tuple(jnp.asarray(column, dtype) for column in (abscissae(), CARRIED, WEIGHTS))
-        (y1, _), _ = jax.lax.scan(stage, (y0, jax.tree.map(jnp.zeros_like, y0)), stages)
-        return y1
+        none = jax.tree.map(jnp.zeros_like, y0)
+        return stages_in_a_loop(stage, (y0, none), abscissae(), CARRIED, WEIGHTS)[0]

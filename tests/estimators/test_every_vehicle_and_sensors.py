@@ -79,6 +79,7 @@ def traced(model):
 
 
 @pytest.mark.product
+@pytest.mark.whole
 @pytest.mark.parametrize("suite", SENSORS)
 @pytest.mark.parametrize("name", CARS)
 def test_a_state_space_runs_or_says_what_to_do(name, suite):

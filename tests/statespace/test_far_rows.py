@@ -98,6 +98,15 @@ def test_slow_motions_near_rows_and_whoever_asks_for_silence_are_left_alone():
         )(1.0)
 
 
+def test_a_gap_between_near_rows_is_told():
+    whole = drive(8.0, dt=0.01, rows=400)
+    cut = whole.rows(np.r_[0:134, 300:400])
+    with silence():
+        filters.run(filters.Extended(), model(statespace.Propagate(settling)), whole)
+    with pytest.warns(JaxvehWarning, match=r"rows 1\.67 s apart are too far for one step at t = 1\.33 s"):
+        filters.run(filters.Extended(), model(statespace.Propagate(settling)), cut)
+
+
 def test_steps_within_other_models_are_looked_at():
     """Parameters as states, disturbances, uncertain inputs: each wraps the transition."""
     plain = model(statespace.Propagate(settling))
