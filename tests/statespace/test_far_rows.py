@@ -98,6 +98,13 @@ def test_slow_motions_near_rows_and_whoever_asks_for_silence_are_left_alone():
         )(1.0)
 
 
+def test_one_row_in_hundreds_is_found_by_its_input():
+    whole = drive(0.1, rows=300)
+    fast = np.where(np.arange(300) == 217, 50.0, 0.1)
+    with pytest.warns(JaxvehWarning, match=r"at t = 21\.7 s"):
+        filters.run(filters.Extended(), model(statespace.Propagate(settling)), whole.replace(fast=fast))
+
+
 def test_a_gap_between_near_rows_is_told():
     whole = drive(8.0, dt=0.01, rows=400)
     cut = whole.rows(np.r_[0:134, 300:400])
