@@ -12,8 +12,8 @@ from jaxveh._core.errors import LARGEST_SEED
 from jaxveh.diagnostics import kit
 
 LOG_HELP = (
-    "The log: .csv (.txt, .tsv, .dat), .parquet, .nc, .mf4, .mdf, .mat or .mcap, with a time column and channels (jaxveh schema "
-    "channels)."
+    "The log: .csv (.txt, .tsv, .dat), .parquet, .nc, .mf4, .mdf, .mat, .mcap or .vbo, with a time column and channels "
+    "(jaxveh schema channels)."
 )
 
 Log = Annotated[Path, typer.Argument(metavar="LOG", help=LOG_HELP, show_default=False)]

@@ -1,5 +1,5 @@
-"""Files: recordings (CSV, Parquet, MDF4, NetCDF, MCAP; MATLAB for reading), channel maps, data frames, car files, road files,
-tyre property files, CommonRoad's vehicle files, and tables of tyre test rigs (CSV, TYDEX, FSAE TTC).
+"""Files: recordings (CSV, Parquet, MDF4, NetCDF, MCAP; MATLAB and VBOX for reading), channel maps, data frames, car files, road
+files, tyre property files, CommonRoad's vehicle files, and tables of tyre test rigs (CSV, TYDEX, FSAE TTC).
 
 The extra `io` has pandas, pyarrow, asammdf, pint, pyyaml, scipy and h5py, the extra `mcap` has mcap; each is imported when used.
 """

@@ -55,9 +55,11 @@ def read_columns(path: Path, told: ChannelMap | None = None) -> TextTable:
     return TextTable(headings, _cells(headings, frame), layout.units, layout.decimal)
 
 
-def read_below(path: Path, headings: list[str], separator: str, lines: int) -> dict[str, Any]:
-    """Return the cells of each column, by heading, below `lines` header lines; bytes that are not UTF-8 are replaced."""
-    layout = Layout(headings, {}, lines, separator, ".", "utf-8-sig", ())
+def read_below(
+    path: Path, headings: list[str], separator: str, lines: int, encoding: str = "utf-8-sig"
+) -> dict[str, Any]:
+    """Return the cells of each column, by heading, below `lines` header lines; bytes of another encoding are replaced."""
+    layout = Layout(headings, {}, lines, separator, ".", encoding, ())
     frame = _read(path, layout, "replace")
     named = _named(headings, frame)
     _tell_short_rows(path, layout, named, frame, "replace")

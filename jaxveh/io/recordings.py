@@ -1,4 +1,4 @@
-"""Reading and writing of recordings: CSV, Parquet, MDF4, NetCDF; MATLAB and MCAP for reading."""
+"""Reading and writing of recordings: CSV, Parquet, MDF4, NetCDF; MATLAB, MCAP and VBOX for reading."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from jaxveh.io.merge import merge, resample
 from jaxveh.io.netcdf import open_netcdf, write_recording_netcdf
 from jaxveh.io.parquet_log import open_parquet, write_parquet
 from jaxveh.io.units import convert, is_unit
+from jaxveh.io.vbo import open_vbo
 
 
 def open_dat(path: Path, channels: ChannelMap | None) -> Log:
@@ -42,6 +43,7 @@ _OPEN: dict[str, Callable[[Path, ChannelMap | None], Log]] = {
     ".mat": open_mat,
     ".mcap": open_mcap,
     ".nc": open_netcdf,
+    ".vbo": open_vbo,
     ".txt": open_csv,
     ".tsv": open_csv,
     ".dat": open_dat,
@@ -56,7 +58,6 @@ _WRITE = {
 _ELSEWHERE = {
     ".xlsx": "save the sheet as CSV",
     ".xls": "save the sheet as CSV",
-    ".vbo": "export it as CSV from the VBOX software, with time in seconds",
     ".ld": "export it as CSV from MoTeC i2",
     ".xrk": "export it as CSV from AiM's Race Studio",
     ".blf": "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)",
@@ -87,7 +88,7 @@ def read_recording(
     method: str = "linear",
 ) -> Recording:
     """Read a log: text (`.csv`, `.txt`, `.tsv`, `.dat`), `.parquet`, `.mf4` or `.mdf` (also as `.dat`), MATLAB's `.mat` (structs
-    included), `.mcap` (topics of JSON messages), or NetCDF 4 (`.nc`).
+    included), `.mcap` (topics of JSON messages), NetCDF 4 (`.nc`), or a VBOX's `.vbo`.
 
     **Arguments**: `channels`: a channel map or the path of one (see `io.channel_map.CHANNEL_MAP_SCHEMA`); without it every column
     is a channel with its own name, and time is the column `time`, `timestamps`, `timestamp` or `t`; columns that are no numbers
@@ -101,6 +102,9 @@ def read_recording(
     **Time base**: MDF4 groups, MATLAB structs and MCAP topics of different rasters are merged, not resampled: a row for every
     time stamp, NaN where a sensor has no sample. Time stamps keep the log's own time, in seconds, on the host in float64;
     channels have JAX's float type. Dates become seconds since 1970, times of day seconds.
+
+    **VBOX**: the standard channels become `speed`, `course`, `z`, `climb_rate`, and `x` (east) and `y` (north) of the first fix;
+    they are NaN in rows without a satellite.
 
     **Text** may have lines above the names of the columns, a line of units below them, `,`, `;`, tabs, `|` or blanks between
     cells, and decimal commas. What was assumed (lines above that are not read, an encoding) is told in a `JaxvehWarning`.

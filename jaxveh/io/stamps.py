@@ -51,14 +51,22 @@ def seconds(cells: Any, what: str) -> np.ndarray | None:
                 raise InputError(f"{what}, data row {row + 1}: {shorten(text)} is no time stamp like {shorten(first)}.")
             found[row] = np.nan if dates else _of_clock(text)
     if not dates:
-        back = np.concatenate([[0.0], np.diff(np.nan_to_num(found))]) < -HALF
-        return found + DAY * np.cumsum(back)
+        return after_midnight(found)
     pandas = require("pandas", "reading dates")
     try:
         stamps = pandas.to_datetime([_point(one) for one in texts], format="ISO8601", utc=True)
     except (ValueError, OverflowError) as error:
         raise InputError(f"{what}: {error}. Write dates as 2024-03-01T10:00:00.5.") from error
     return seconds(stamps.tz_convert(None).to_numpy(), what)
+
+
+def after_midnight(clock: np.ndarray) -> np.ndarray:
+    """Return times of day (n,) in seconds that go on after midnight, also where some are missing."""
+    known = np.isfinite(clock)
+    found = np.full(clock.shape, np.nan)
+    back = np.diff(clock[known], prepend=clock[known][:1]) < -HALF
+    found[known] = clock[known] + DAY * np.cumsum(back)
+    return found
 
 
 def _point(text: Any) -> str | None:

@@ -178,6 +178,14 @@ def test_time_stamps_become_seconds(tmp_path, form, hour):
     np.testing.assert_allclose(recording.time[0], since, atol=1e-2)
 
 
+def test_a_missing_time_of_day_is_no_midnight(tmp_path):
+    own = io.ChannelMap({"v_x": io.Channel("v_x", time=io.Channel("clock"))})
+    text = "clock,v_x\n23:59:58,1\n,2\n23:59:59,3\n,4\n00:00:01,5\n"
+    recording = read(tmp_path / "log.csv", text, own)
+    np.testing.assert_allclose(recording.time, [86398.0, 86399.0, 86401.0])
+    np.testing.assert_array_equal(recording["v_x"], [1.0, 3.0, 5.0])
+
+
 def test_time_stamps_that_are_not_alike(tmp_path):
     with pytest.raises(InputError, match=r"column 'time', data row 2: '10:5' is no time stamp like '10:00:00'"):
         read(tmp_path / "log.csv", "time,v_x\n10:00:00,1\n10:5,2\n")
@@ -274,7 +282,7 @@ def test_a_dat_file_may_be_mdf(tmp_path):
     np.testing.assert_array_equal(io.read_recording(tmp_path / "log.dat")["v_x"], [1.0, 2.0])
 
 
-@pytest.mark.parametrize("suffix", [".xlsx", ".vbo", ".ld", ".blf", ".asc", ".bag", ".h5", ".pkl", ".feather"])
+@pytest.mark.parametrize("suffix", [".xlsx", ".ld", ".blf", ".asc", ".bag", ".h5", ".pkl", ".feather"])
 def test_what_is_not_read_is_told_with_what_to_do(tmp_path, suffix):
     with pytest.raises(
         InputError, match=r"is not read: (save|export|decode|convert|load) .*; a log must end in one of"

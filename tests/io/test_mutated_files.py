@@ -11,6 +11,7 @@ from test_commonroad_files import CAR as COMMONROAD
 from test_commonroad_files import TYRE as COMMONROAD_TYRE
 from test_tydex import PLAIN, ROWS
 from test_tydex import text as tydex_text
+from test_vbo import PLAIN as VBOX
 
 from jaxveh import io, tyres
 from jaxveh._core.errors import InputError
@@ -83,6 +84,7 @@ KINDS = {
     "channel map": (io.read_channel_map, "toml", [channel_map.CHANNEL_MAP_SCHEMA, MAP]),
     "tyre parameters": (tyres.read_parameters, "toml", [PARAMETERS]),
     "log": (read_log, "csv", [LOG, LOG.replace("\n", "\r\n"), LOG.replace(",", "\t")]),
+    "log of a VBOX": (read_log, "vbo", [VBOX, VBOX.replace("velocity", "lat")]),
     "log by map": (read_log_by_map, "csv", [SEMICOLONS]),
     "rig table": (read_rig, "csv", [RIG, RIG.replace(",", ";")]),
     "TYDEX": (read_rig, "tdx", [TYDEX]),
