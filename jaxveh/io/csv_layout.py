@@ -54,7 +54,7 @@ def find_layout(path: Path, told: ChannelMap | None) -> Layout:
 
     **Raises** `InputError` for bytes that are no text, and names that cannot be found.
     """
-    encoding, remark = encoding_of(path, told.encoding if told else None)
+    encoding, remark = text_encoding(path, told.encoding if told else None)
     try:
         with path.open(encoding=encoding, newline=None) as file:
             lines = [line for _, line in zip(range(HEAD), file, strict=False)]
@@ -87,7 +87,7 @@ def _layout(
     return Layout(headings, by_name, first, separator, decimal, encoding, tuple(remarks))
 
 
-def encoding_of(path: Path, told: str | None) -> tuple[str, str]:
+def text_encoding(path: Path, told: str | None) -> tuple[str, str]:
     """Return the encoding of a file, and what was assumed about it."""
     with path.open("rb") as file:
         head = file.read(4096)

@@ -16,7 +16,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh.io.channel_map import ChannelMap
-from jaxveh.io.csv_layout import BLANKS, encoding_of
+from jaxveh.io.csv_layout import BLANKS, text_encoding
 from jaxveh.io.csv_log import read_below
 from jaxveh.io.geodesy import east_and_north
 from jaxveh.io.log import TableLog, numeric
@@ -65,7 +65,7 @@ def open_vbo(path: Path, channels: ChannelMap | None) -> TableLog:
 
     **Raises** `InputError` for a file without its sections, or without a row.
     """
-    encoding, _ = encoding_of(path, channels.encoding if channels else None)
+    encoding, _ = text_encoding(path, channels.encoding if channels else None)
     head = _head(path, encoding)
     cells = read_below(path, head.columns, BLANKS, head.lines, encoding)
     if len(cells[head.columns[0]]) == 0:
