@@ -1,4 +1,4 @@
-"""Logs without `v_x`, as production cars write them: the speed is estimated first, from the wheel speeds."""
+"""Logs without `v_x`: those of production cars have wheel speeds, those of satellite receivers the speed over ground."""
 
 from __future__ import annotations
 
@@ -10,14 +10,25 @@ from jaxveh.io import CarSpecification
 
 
 def with_speed(log: Path, recording: Recording, car: CarSpecification) -> Recording:
-    """Return the log with the speed of the recommended method as `v_x`, with a note, if it has wheel speeds and no `v_x`."""
+    """Return the log with `v_x`, and a note, if it has none: the speed that the recommended method finds from the wheel speeds,
+    without them the speed over ground, which is larger by the sideslip's cosine and has no sign."""
     speed = estimators.speed
-    if "v_x" in recording or not any(name.startswith("wheel_speed_") for name in recording.names):
+    if "v_x" in recording:
         return recording
-    words = (
-        f"note: {log.name}: there is no v_x: it is estimated from the wheel speeds, as --what speed does ({speed.RECOMMENDED}), "
-        "and used like a measurement."
-    )
-    results().print(words, markup=False, soft_wrap=True)
-    found = speed.estimate(car, recording)
-    return recording.replace(v_x=found["v_x"], units={"v_x": "m/s"})
+    if any(name.startswith("wheel_speed_") for name in recording.names):
+        _tell(
+            log,
+            f"it is estimated from the wheel speeds, as --what speed does ({speed.RECOMMENDED}), and used like a measurement",
+        )
+        return recording.replace(v_x=speed.estimate(car, recording)["v_x"], units={"v_x": "m/s"})
+    if "speed" in recording:
+        _tell(
+            log,
+            "the speed over ground is used for it. It is 0.4 % larger at 5 degrees of sideslip, and positive in reverse",
+        )
+        return recording.replace(v_x=recording["speed"], units={"v_x": "m/s"})
+    return recording
+
+
+def _tell(log: Path, what: str) -> None:
+    results().print(f"note: {log.name}: there is no v_x: {what}.", markup=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""A log with wheel speeds and without `v_x` is estimated with the speed that the wheels give, and the program says so."""
+"""A log without `v_x` is estimated with the speed that its wheels give, or that over ground, and the program says so."""
 
 import sys
 from pathlib import Path
@@ -39,15 +39,35 @@ def test_the_speed_is_that_of_the_recommended_method(capsys):
     )
 
 
-@pytest.mark.parametrize("what", [("--as-told",), ("--what", "bank")])
-def test_programs_take_such_a_log(tmp_path, what):
+def test_without_wheels_it_is_the_speed_over_ground(capsys):
+    drive = log("v_x", "wheel_speed")
+    found = with_speed(Path("a.csv"), drive, method_logs.CAR)
+    np.testing.assert_array_equal(found["v_x"], log()["speed"])
+    assert found.unit("v_x") == "m/s"
+    assert "note: a.csv: there is no v_x: the speed over ground is used" in " ".join(capsys.readouterr().out.split())
+
+
+WITHOUT = {"wheels": ("v_x", "speed"), "satellites": ("v_x", "wheel_speed")}
+
+
+@pytest.mark.parametrize(
+    ("what", "left"), [("--as-told", "wheels"), ("--as-told", "satellites"), ("--what bank", "wheels")]
+)
+def test_programs_take_such_a_log(tmp_path, what, left):
     io.write_car(method_logs.CAR, tmp_path / "car.toml")
     columns = {}
-    for name, drive in {"with": log(), "without": log("v_x", "speed")}.items():
+    for name, drive in {"with": log(), "without": log(*WITHOUT[left])}.items():
         io.write_recording(drive, tmp_path / f"{name}.csv")
         out = tmp_path / f"{name}.out.csv"
         result = run(
-            "estimate", tmp_path / f"{name}.csv", "--vehicle", tmp_path / "car.toml", "-o", out, *what, "--anyway"
+            "estimate",
+            tmp_path / f"{name}.csv",
+            "--vehicle",
+            tmp_path / "car.toml",
+            "-o",
+            out,
+            *what.split(),
+            "--anyway",
         )
         assert result.exit_code == 0, result.output
         assert ("there is no v_x" in " ".join(result.stdout.split())) == (name == "without")
