@@ -25,7 +25,8 @@ INPUTS = tuple(need.channel for need in sideslip.needs if need.throughout)
 
 
 def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
-    """Fill gaps in the inputs by linear interpolation over at most `max_gap` seconds, if that is given.
+    """Fill gaps in the inputs by linear interpolation over at most `max_gap` seconds, if that is given; rows before the first
+    sample and after the last one, as slower sensors have them, take the nearest sample that is not further away.
 
     **Raises** `InputError`, with the option that helps, if a channel of `NEEDED` is missing, or an input is still NaN.
     """
@@ -39,7 +40,7 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
         )
     for name in (*INPUTS, *(("steer",) if "steer" in recording else ())):
         if max_gap is not None and np.isfinite(np.asarray(recording[name])).any():
-            recording = recording.fill(name, "linear", max_gap)
+            recording = _with_ends(recording.fill(name, "linear", max_gap), name, max_gap)
         gaps = np.isnan(np.asarray(recording[name]))
         if name in INPUTS and gaps.any():
             first = np.asarray(recording.time)[np.argmax(gaps)]
@@ -49,6 +50,15 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
                 f"{advice}."
             )
     return recording
+
+
+def _with_ends(recording: Recording, name: str, reach: float) -> Recording:
+    """The recording with the first and the last sample of a channel also in the rows before and after them, up to `reach`, s."""
+    time, values = np.asarray(recording.time), np.array(recording[name])
+    first, last = np.flatnonzero(np.isfinite(values))[[0, -1]]
+    values[(time < time[first]) & (time >= time[first] - reach)] = values[first]
+    values[(time > time[last]) & (time <= time[last] + reach)] = values[last]
+    return recording.replace(**{name: values})
 
 
 def with_fill_option(reason: str) -> str:

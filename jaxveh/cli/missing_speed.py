@@ -11,20 +11,17 @@ from jaxveh.io import CarSpecification
 
 def with_speed(log: Path, recording: Recording, car: CarSpecification) -> Recording:
     """Return the log with `v_x`, and a note, if it has none: the speed that the recommended method finds from the wheel speeds,
-    without them the speed over ground, which is larger by the sideslip's cosine and has no sign."""
+    without them the speed over ground, of which `v_x` is the part along the car, and which has no sign."""
     speed = estimators.speed
     if "v_x" in recording:
         return recording
     if any(name.startswith("wheel_speed_") for name in recording.names):
-        _tell(
-            log,
-            f"it is estimated from the wheel speeds, as --what speed does ({speed.RECOMMENDED}), and used like a measurement",
-        )
+        how = f"as --what speed does ({speed.RECOMMENDED}), and used like a measurement"
+        _tell(log, f"it is estimated from the wheel speeds, {how}")
         return recording.replace(v_x=speed.estimate(car, recording)["v_x"], units={"v_x": "m/s"})
     if "speed" in recording:
         _tell(
-            log,
-            "the speed over ground is used for it. It is 0.4 % larger at 5 degrees of sideslip, and positive in reverse",
+            log, "the speed over ground is used. It is 0.4 % larger at 5 degrees of sideslip, and positive in reverse"
         )
         return recording.replace(v_x=recording["speed"], units={"v_x": "m/s"})
     return recording
