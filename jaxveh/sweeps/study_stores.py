@@ -60,18 +60,22 @@ class Stores:
         *,
         data: Any = None,
         batch: int | None = None,
+        alike: int | None = None,
         devices: list | None = None,
         progress: Progress = silent,
     ) -> Swept:
         """`sweeps.sweep`, in the store of this `name` if there are stores: finished chunks are read and not computed.
 
         Arguments are those of `sweeps.sweep`; `devices` are for a sweep without a store. Chunks of a store have `batch` or
-        `RUNS` runs. The result is in memory: the tables of a study read each value many times.
+        `RUNS` runs. `alike`: the number of runs at a time without a store. Sweeps of one function with as many are one program,
+        which is compiled once where programs are kept (as those of `jaxveh reproduce` are). The result is in memory: the tables
+        of a study read each value many times.
 
         **Raises** `InputError` as `sweeps.sweep` does, and if chunks have failed: the study needs all of them.
         """
         if self.folder is None:
-            return sweep(run, design, seeds, key, data=data, batch=batch, devices=devices, progress=progress)
+            at_once = batch if alike is None else alike
+            return sweep(run, design, seeds, key, data=data, batch=at_once, devices=devices, progress=progress)
         path = Path(self.folder) / f"{name}.zarr"
         found = sweep(
             run, design, seeds, key, data=data, batch=RUNS if batch is None else batch, progress=progress,

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Any
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -13,12 +10,12 @@ import numpy as np
 from jaxveh import filters, sweeps
 from jaxveh._core.names import record_type
 from jaxveh._core.progress import Progress, part, silent
-from jaxveh.experiments.federated_ckf.contestants import contestants, metrics, with_shares
+from jaxveh.experiments.federated_ckf.contestants import Contestant, contestants, with_shares
 from jaxveh.experiments.federated_ckf.drives import Drive
 from jaxveh.experiments.federated_ckf.model import noise_levels, planar, rows_of, states_model
 from jaxveh.experiments.federated_ckf.printed import as_printed as printed_filters
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, PRINTED_START, Start, Study
-from jaxveh.experiments.federated_ckf.study import drives_of, truth
+from jaxveh.experiments.federated_ckf.study import ALIKE, Setting, along_drives, drives_of, run_of, truth
 from jaxveh.experiments.report import spread
 from jaxveh.statespace import Gaussian, kit
 from jaxveh.sweeps import IN_MEMORY, Stores, Table
@@ -48,29 +45,24 @@ def as_printed(
     return [_table(found, seeds), _traces(twice, seeds)]
 
 
-def _runs(study: Study) -> dict[str, tuple[Any, str]]:
+def _runs(study: Study) -> dict[str, Contestant]:
     every = contestants(study)
-    own = {name: (every[name].run, every[name].what) for name in SHOWN}
+    own = {name: every[name] for name in SHOWN}
     first = {"first guess": own.pop("first guess")}
     what = "printed P, Q, R and start; shares 1/2 at first (printed: 0), zeros in R as 1e-8, R of parameters for three channels"
-    shares = with_shares()
-    return {**first, "as printed": (printed_filters, what), **own, "federated, disjoint sensors": shares[:2]}
+    return {
+        **first,
+        "as printed": Contestant(printed_filters, what),
+        **own,
+        "federated, disjoint sensors": with_shares(),
+    }
 
 
 def _race(study: Study, drives: Drive, progress: Progress, stores: Stores) -> sweeps.Swept:
-    start, right = Start(*map(jnp.asarray, dataclasses.astuple(PRINTED_START))), truth(study)
-    names = (*[f"{name}_error" for name in PARAMETERS], "sideslip_rmse", "v_x_rmse", "parameters")
-
-    def of(estimate):
-        def run(drive):
-            found = metrics(study, estimate(study, start, drive), drive, jnp.asarray(right))
-            return {name: found[name] for name in names}
-
-        return run
-
-    design = sweeps.Design(estimator={name: of(estimate) for name, (estimate, _) in _runs(study).items()})
-    run = lambda point, drive: point.estimator(drive)
-    return stores.sweep("race", run, design, data=drives, progress=progress)
+    design = sweeps.Design(estimator={name: run_of(study, one) for name, one in _runs(study).items()})
+    data = along_drives((Setting.of(study, PRINTED_START), drives))
+    run = lambda point, data: point.estimator(data)
+    return stores.sweep("race", run, design, data=data, alike=ALIKE, progress=progress)
 
 
 def _table(found: sweeps.Swept, seeds: int) -> Table:
@@ -80,7 +72,7 @@ def _table(found: sweeps.Swept, seeds: int) -> Table:
         at = lambda value, scale=1.0, name=name: spread(found.at(value, estimator=name), scale=scale)
         final = np.median(found.at("parameters", estimator=name)[:, -1], axis=0)
         errors = [at(f"{parameter}_error", 100.0) for parameter in PARAMETERS]
-        rows.append((name, *errors, float(final[1]), at("sideslip_rmse"), at("v_x_rmse"), whats[name][1]))
+        rows.append((name, *errors, float(final[1]), at("sideslip_rmse"), at("v_x_rmse"), whats[name].what))
     return Table(
         f"As printed: constant 20 km/h, steer 8 degrees, mu 0.2, from mu 1, 700 kg, 1400 kg m^2, 1.0 m; {seeds} seeds",
         (

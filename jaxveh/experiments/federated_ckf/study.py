@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -12,7 +13,7 @@ import numpy as np
 from jaxveh import sweeps
 from jaxveh._core.errors import check_whole
 from jaxveh._core.progress import Progress, silent
-from jaxveh.experiments.federated_ckf.contestants import contestants, metrics
+from jaxveh.experiments.federated_ckf.contestants import Contestant, contestants, metrics
 from jaxveh.experiments.federated_ckf.drives import Drive, drive_once, times
 from jaxveh.experiments.federated_ckf.settings import OTHER_START, PARAMETERS, PRINTED_START, Start, Study
 from jaxveh.sweeps import IN_MEMORY, Stores
@@ -41,6 +42,10 @@ def cases(study: Study) -> dict[str, Case]:
 
 OTHER_NOISE = (0.01, 0.01, 1e-3)
 """The noises of the greatest likelihood on drives of other keys with other tyres, within a factor of three."""
+
+
+ALIKE = 20
+"""Runs at a time: a drive or an estimator is one program, in whichever part of the report it runs."""
 
 
 class Raced(NamedTuple):
@@ -80,7 +85,7 @@ def drives_of(
     run = lambda point, key: drive_once(study, point.amplitude, point.speed_std, key, magic_formula=magic_formula)
     # The design's axis cannot be called steer, as a drive has a `steer` of its own.
     design = sweeps.Design(amplitude=steer, speed_std=speed_std)
-    found = stores.sweep("drives", run, design, seeds, key, progress=progress)
+    found = stores.sweep("drives", run, design, seeds, key, alike=ALIKE, progress=progress)
     return Drive(**{name: found[name] for name in Drive._fields})
 
 
@@ -125,25 +130,47 @@ def race(
     every = contestants(study)
     chosen = {name: every[name] for name in (every if only is None else only)}
     here = [cases(study)[name] for name in names]
-    starts = np.array([dataclasses.astuple(case.start) for case in here])
-    noises = np.array([case.noise or (study.speed_noise, study.yaw_noise, study.walk) for case in here])
+    set_to = [Setting.of(study, case.start, case.noise) for case in here]
+    design = sweeps.Design(
+        estimator={name: run_of(study, contestant) for name, contestant in chosen.items()}, case=range(len(names))
+    )
+    run = lambda point, data: point.estimator(data)
+    data = (jax.tree.map(lambda *leaves: np.stack(leaves)[:, None], *set_to), drives)
+    found = stores.sweep("race", run, design, data=along_drives(data), alike=ALIKE, progress=progress)
+    return Raced(study, tuple(names), drives, found)
+
+
+class Setting(NamedTuple):
+    """What an estimator starts with: `start` (4,) and process `noise` (3,), as in `Case`."""
+
+    start: Any
+    noise: Any
+
+    @classmethod
+    def of(cls, study: Study, start: Start, noise: tuple[float, float, float] | None = None) -> Setting:
+        """This start with this noise, or the study's."""
+        usual = (study.speed_noise, study.yaw_noise, study.walk)
+        return cls(np.array(dataclasses.astuple(start)), np.array(usual if noise is None else noise))
+
+
+def along_drives(data: tuple[Setting, Drive]) -> tuple[Setting, Drive]:
+    """The data with the setting repeated for each of the drives."""
+    setting, drives = data
+    lead = np.shape(drives.yaw_rate)[:-1]
+    return jax.tree.map(lambda leaf: np.broadcast_to(leaf, (*lead, leaf.shape[-1])), setting), drives
+
+
+def run_of(study: Study, contestant: Contestant) -> Callable[[tuple[Setting, Drive]], dict[str, Any]]:
+    """The metrics of an estimator on a drive; its setting is data, so that it is one program for every case."""
     right = truth(study)
 
-    def runs(contestant):
-        def run(point: Any, drive: Drive):
-            case = point.case.astype(int)
-            start, noise = Start(*jnp.asarray(starts)[case]), jnp.asarray(noises)[case]
-            own = dataclasses.replace(study, speed_noise=noise[0], yaw_noise=noise[1], walk=noise[2])
-            return metrics(study, contestant.run(own, start, drive), drive, jnp.asarray(right))
+    def run(data: tuple[Setting, Drive]) -> dict[str, Any]:
+        setting, drive = data
+        speed_noise, yaw_noise, walk = setting.noise
+        own = dataclasses.replace(study, speed_noise=speed_noise, yaw_noise=yaw_noise, walk=walk)
+        return metrics(study, contestant.run(own, Start(*setting.start), drive), drive, jnp.asarray(right))
 
-        return run
-
-    design = sweeps.Design(
-        estimator={name: runs(contestant) for name, contestant in chosen.items()}, case=range(len(names))
-    )
-    run = lambda point, drive: point.estimator(point, drive)
-    found = stores.sweep("race", run, design, data=drives, progress=progress)
-    return Raced(study, tuple(names), drives, found)
+    return run
 
 
 def race_over(
@@ -157,13 +184,9 @@ def race_over(
 ) -> sweeps.Swept:
     """One estimator from the nearer start on drives (steers, spreads, seeds, T, ...): a sweep with the axes steer,
     speed_std."""
-    contestant, right = contestants(study)[estimator], truth(study)
-
-    def run(point, drive):
-        del point
-        start = Start(*map(jnp.asarray, dataclasses.astuple(OTHER_START)))
-        found = metrics(study, contestant.run(study, start, drive), drive, jnp.asarray(right))
-        return {name: found[name] for name in (*[f"{name}_error" for name in PARAMETERS], "spread", "sideslip_rmse")}
-
+    run = run_of(study, contestants(study)[estimator])
+    data = along_drives((Setting.of(study, OTHER_START), drives))
     design = sweeps.Design(steer=steers, speed_std=spreads)
-    return stores.sweep("race-over", run, design, data=drives, progress=progress)
+    found = stores.sweep("race-over", lambda point, data: run(data), design, data=data, alike=ALIKE, progress=progress)
+    shown = (*[f"{name}_error" for name in PARAMETERS], "spread", "sideslip_rmse")
+    return dataclasses.replace(found, values={name: found.values[name] for name in shown})

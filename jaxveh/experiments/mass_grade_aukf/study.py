@@ -40,7 +40,9 @@ def drives_of(
     """Drives of the study with each pedal activity (m/s^2), one per seed: (pedals, seeds, T)."""
     check_whole("seeds", seeds, 2)
     run = lambda point, key: drive_once(study, point.pedals, key)
-    found = stores.sweep("drives", run, sweeps.Design(pedals=pedals), seeds, key, batch=batch, progress=progress)
+    found = stores.sweep(
+        "drives", run, sweeps.Design(pedals=pedals), seeds, key, batch=batch, alike=seeds, progress=progress
+    )
     return Drive(**{name: found[name] for name in Drive._fields})
 
 
@@ -63,5 +65,7 @@ def race(
         lambda leaf: np.broadcast_to(leaf[:, None], (len(pedals), len(study.guesses), *leaf.shape[1:])), drives
     )
     run = lambda point, drive: point.estimator(point, drive)
-    found = stores.sweep("race", run, design, data=shared, progress=progress)
+    # All guesses and seeds of one activity: an estimator is one program for lively and gentle pedals and wrong signals.
+    alike = len(study.guesses) * np.shape(drives.v_x)[1]
+    found = stores.sweep("race", run, design, data=shared, alike=alike, progress=progress)
     return Raced(study, tuple(pedals), drives, found)

@@ -17,6 +17,10 @@ from jaxveh.experiments.model_adaptive_pf.drives import Drive, drive_once, fiala
 from jaxveh.experiments.model_adaptive_pf.settings import Case, Study
 from jaxveh.sweeps import IN_MEMORY, Stores
 
+ALIKE = 8
+"""Runs at a time: a filter is one program in all races. So few of them are not written out (`statespace.kit`), so that compiling
+takes two thirds of the time: more than the runs, which take twice as long."""
+
 
 class Raced(NamedTuple):
     """The `drives`, (cases, seeds, T) each, of `cases` by name, and the results of the estimators, `found`, with the axes
@@ -74,7 +78,7 @@ def race(
     runs = {name: of_a_point(study, contestant, tyre) for name, contestant in chosen.items()}
     design = sweeps.Design(estimator=runs, **{axis.name: axis.values for axis in _design(cases).axes})
     run = lambda point, key, data: point.estimator(point, key, data)
-    found = stores.sweep("race", run, design, seeds, key, data=(own, drives), progress=progress)
+    found = stores.sweep("race", run, design, seeds, key, data=(own, drives), alike=ALIKE, progress=progress)
     return Raced(study, dict(cases), drives, found)
 
 
