@@ -33,11 +33,11 @@ NOT_REAL = "USOcMm"
 
 
 def check(name: str, value, holds, allowed: str, advice: str = "") -> None:
-    """Raise `InputError` naming `name`, `value` and the `allowed` range unless `holds(value)`; tracers pass.
+    """Raise `InputError` naming `name`, `value` and the `allowed` range unless `holds(value)`; tracers pass, None does not.
 
     `holds` is applied to the value as a NumPy array of real numbers and must hold for every element.
     """
-    if value is None or not is_concrete(value):
+    if not is_concrete(value):
         return
     try:
         array = np.asarray(value)
@@ -63,6 +63,21 @@ def check_finite(name: str, value, advice: str = "") -> None:
 def check_at_least(name: str, value, least, advice: str = "") -> None:
     """Raise `InputError` unless every element of `value` is at least `least`."""
     check(name, value, lambda v: v >= least, f"at least {least}", advice)
+
+
+def check_single(**values) -> None:
+    """Raise `InputError` unless each of the named values is one real number, and no array, list, text or None; tracers pass."""
+    for name, value in values.items():
+        check(name, value, lambda _: True, "one number")
+        if np.ndim(value):
+            raise InputError(f"{name} has the shape {np.shape(value)}: must be one number.")
+
+
+def check_kind(name: str, value, kind: type, advice: str = "") -> None:
+    """Raise `InputError` unless `value` is of a kind; `advice` says what makes one."""
+    if not isinstance(value, kind):
+        shown = kind.__name__.removeprefix("Abstract")
+        raise InputError(f"{name} = {word_for(value)}: must be of the kind {shown}." + (f" {advice}" if advice else ""))
 
 
 def word_for(value) -> str:
@@ -151,7 +166,7 @@ def float_array(value) -> Any:
         # NumPy converts it in two thirds of the time, and a tyre has hundreds of them.
         with np.errstate(over="ignore"):
             return jax.numpy.asarray(np.asarray(value, jax.dtypes.canonicalize_dtype(float)))
-    if isinstance(value, (jax.Array, np.ndarray, np.generic)) and np.issubdtype(value.dtype, np.floating):
+    if isinstance(value, (jax.Array, np.ndarray, np.generic)) and jax.numpy.issubdtype(value.dtype, np.floating):
         weak = getattr(value, "weak_type", False)
         return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float if weak else value.dtype))
     if type(value) is int and abs(value) > LARGEST_SEED:
@@ -160,6 +175,15 @@ def float_array(value) -> Any:
     if eqx.is_array_like(value) and not _is_no_number(value):
         return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float))
     return value
+
+
+def real_array(name: str, value) -> Any:
+    """Return what may be a number, an array or a list of numbers as an array; raises `InputError` with the name for others.
+
+    NaN passes, as a missing value.
+    """
+    check(name, value, lambda _: True, "or an array of them")
+    return jax.numpy.asarray(value, None if hasattr(value, "dtype") else jax.dtypes.canonicalize_dtype(float))
 
 
 def _is_no_number(value) -> bool:

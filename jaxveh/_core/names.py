@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from keyword import iskeyword
 from typing import Any
 
-from jaxveh._core.errors import InputError, did_you_mean
+from jaxveh._core.errors import InputError, did_you_mean, word_for
 
 
 @functools.cache
@@ -56,11 +56,19 @@ def as_mapping(values, what: str = "values") -> dict:
     raise InputError(f"{what} = {type(values).__name__}: must be a NamedTuple or a mapping from names to values.")
 
 
-def as_names(values) -> Any:
-    """Return names as a tuple, which a static field must be; a single string is one name, not its letters. None stays None."""
+def as_names(values, what: str = "names") -> Any:
+    """Return names as a tuple, which a static field must be; a single string is one name, not its letters. None stays None.
+
+    Raises `InputError` for what is no name, nor several.
+    """
     if values is None:
         return None
-    return (values,) if isinstance(values, str) else tuple(values)
+    if isinstance(values, str):
+        return (values,)
+    try:
+        return tuple(values)
+    except TypeError:
+        raise InputError(f"{what} = {word_for(values)}: must be a name, or several.") from None
 
 
 def as_groups(values) -> Any:
@@ -71,9 +79,10 @@ def as_groups(values) -> Any:
 def check_names(what: str, names: Iterable[str], allowed: Iterable[str]) -> None:
     """Raise `InputError` unless every one of `names` is among `allowed`; the message lists the allowed names."""
     allowed = tuple(allowed)
-    unknown = [name for name in names if name not in allowed]
+    names = () if names is None else as_names(names, what)
+    # Compared one by one: an array among them would be compared with each of its elements.
+    unknown = [name for name in names if not isinstance(name, str) or name not in allowed]
     if unknown:
         there = ", ".join(allowed) or "none"
-        raise InputError(
-            f"{what}: unknown name(s) {', '.join(unknown)}; there are: {there}.{did_you_mean(unknown, allowed)}"
-        )
+        shown = ", ".join(name if isinstance(name, str) else word_for(name) for name in unknown)
+        raise InputError(f"{what}: unknown name(s) {shown}; there are: {there}.{did_you_mean(unknown, allowed)}")

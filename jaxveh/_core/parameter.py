@@ -46,7 +46,15 @@ def table(unit: str = "-", domain: AbstractBijector | None = None, scale: float 
 
 
 def _table_array(value):
-    return float_array(np.asarray(value, float) if isinstance(value, list | tuple) else value)
+    return float_array(_of_numbers(value) if isinstance(value, list | tuple) else value)
+
+
+def _of_numbers(values: list | tuple) -> Any:
+    """A list of numbers as an array; what is none stays as it is, for a check that knows its name."""
+    try:
+        return np.asarray(values, float)
+    except (TypeError, ValueError, OverflowError):
+        return values
 
 
 def positive(unit: str = "-", **kwargs):
@@ -57,11 +65,11 @@ def positive(unit: str = "-", **kwargs):
 def check_parameters(module: eqx.Module) -> None:
     """Raise `InputError` unless every declared parameter of a module is finite, and positive if declared positive.
 
-    For use in `__check_init__`; a parameter that is None (an option that is off) passes, and so do tracers.
+    For use in `__check_init__`; an option that is off (None, if that is its default) passes, and so do tracers.
     """
     for field in dataclasses.fields(module):
         value, domain = getattr(module, field.name), field.metadata.get("domain")
-        if domain is None or value is None:
+        if domain is None or (value is None and field.default is None):
             continue
         name = f"{type(module).__name__}.{field.name}"
         if isinstance(domain, Positive):

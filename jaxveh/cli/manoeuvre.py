@@ -37,7 +37,8 @@ def parse_manoeuvre(
     # In the units of the options: the manoeuvre itself would tell of rad.
     if speed is not None:
         manoeuvres.kit.check_speed("--speed", speed)
-    manoeuvres.kit.check_steer_deg("--steer-deg", steer_deg)
+    if steer_deg is not None:
+        manoeuvres.kit.check_steer_deg("--steer-deg", steer_deg)
     usual_speed, usual_steer = USUAL[name]
     options = {**options_of_car(name, car), **_settings(name, settings)}
     if duration is not None:

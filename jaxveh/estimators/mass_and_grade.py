@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax.numpy as jnp
@@ -91,8 +91,7 @@ def model(
     **Raises** `InputError` for spreads out of range, and as `car_of` does.
     """
     car = car_of(car)
-    for name, value in (("v_x", v_x), ("a_x", a_x), ("a_x_bias", a_x_bias), ("grade_spread", grade_spread)):
-        check_positive(f"mass_and_grade: {name}", value)
+    _check_spreads({"v_x": v_x, "grade_spread": grade_spread}, {"a_x": a_x, "a_x_bias": a_x_bias})
     if a_x_bias is not None and a_x is None:
         raise InputError("mass_and_grade: a_x_bias: there is no accelerometer; give its noise, a_x.")
     check("mass_and_grade: grade_walk", grade_walk, lambda v: v >= 0, "at least 0 rad per root second")
@@ -113,6 +112,13 @@ def model(
         inputs=(*car.inputs, *more_inputs), input_path=input_path,
     )  # fmt: skip
     return with_parameters(model, lambda model: (model.system.mass,), mass_spread, mass_walk, domain=mass_domain)
+
+
+def _check_spreads(needed: Mapping[str, Any], optional: Mapping[str, Any]) -> None:
+    """Raise `InputError` unless the standard deviations are positive; an optional one may be None."""
+    fitted = {name: value for name, value in optional.items() if value is not None}
+    for name, value in {**needed, **fitted}.items():
+        check_positive(f"mass_and_grade: {name}", value)
 
 
 def chosen_parameters(model: Any):

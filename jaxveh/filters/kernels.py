@@ -103,7 +103,8 @@ class Regularised(AbstractKernel):
     share: float = eqx.field(static=True, default=0.5)
 
     def __check_init__(self):
-        check("Regularised.bandwidth", self.bandwidth, lambda v: v > 0, "positive")
+        if self.bandwidth is not None:
+            check("Regularised.bandwidth", self.bandwidth, lambda v: v > 0, "positive")
         check("Regularised.share", self.share, lambda v: v > 0, "positive")
 
     def smeared_states(self, model):

@@ -84,13 +84,7 @@ def constant_speed(steer: jax.Array, speed: jax.Array) -> DriverInputs:
 
 def check_speed(name: str, speed) -> None:
     """Raise `InputError` unless a speed is between 0 and `FASTEST`."""
-    _check_given(name, speed)
     check(name, speed, lambda v: (v >= 0) & (v <= FASTEST), f"between 0 and {FASTEST:g} m/s")
-
-
-def _check_given(name: str, value) -> None:
-    if value is None:
-        raise InputError(f"{name} = None: must be a real number.")
 
 
 def check_steer_deg(name: str, steer_deg) -> None:
@@ -101,7 +95,6 @@ def check_steer_deg(name: str, steer_deg) -> None:
 def check_drive(speed, duration, steer=0.0) -> None:
     """Raise `InputError` unless speed, duration and steer are within their ranges."""
     check_speed("speed", speed)
-    _check_given("steer", steer)
     check("steer", steer, _below_a_quarter_turn, "within a quarter turn", _advice(speed, steer))
     check_positive("duration", duration, "s")
     if eqx.is_array(duration):

@@ -9,7 +9,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_finite, check_positive
+from jaxveh._core.errors import (
+    InputError,
+    check_finite,
+    check_kind,
+    check_positive,
+    check_single,
+    check_whole,
+    real_array,
+)
 from jaxveh.manoeuvres.paths import LaneChanges
 
 CONE_DIAMETER = 0.3
@@ -98,6 +106,7 @@ def slalom_cones(spacing: float = 18.0, count: int = 6, start: float = 30.0, dia
     **Raises** `InputError` for a spacing or diameter that is not positive, or fewer than 2 cones.
     """
     check_slalom(spacing, count, start)
+    check_single(diameter=diameter)
     check_positive("diameter", diameter, "m")
     lanes = []
     for k in range(count):
@@ -109,10 +118,10 @@ def slalom_cones(spacing: float = 18.0, count: int = 6, start: float = 30.0, dia
 
 def check_slalom(spacing, count, start) -> None:
     """Raise `InputError` unless these are valid for the cones of a slalom."""
+    check_single(spacing=spacing, start=start)
     check_positive("spacing", spacing, "m")
     check_finite("start", start)
-    if count < 2:
-        raise InputError(f"count = {count}: must be at least 2 cones.")
+    check_whole("count", count, 2)
 
 
 def centre_line(course: Course, lead: float) -> LaneChanges:
@@ -123,6 +132,8 @@ def centre_line(course: Course, lead: float) -> LaneChanges:
 
     **Raises** `InputError` for a course that does not have three lanes, or a lead that does not fit into the lanes.
     """
+    _check_course(course)
+    check_single(lead=lead)
     if len(course.lanes) != 3:
         raise InputError(f"course = {course.name}: {len(course.lanes)} lanes; must have 3.")
     first, second, third = course.lanes
@@ -148,6 +159,8 @@ def cones(course: Course, spacing: float = 3.0, diameter: float = CONE_DIAMETER)
 
     **Raises** `InputError` for a spacing or diameter that is not positive.
     """
+    _check_course(course)
+    check_single(spacing=spacing, diameter=diameter)
     check_positive("spacing", spacing, "m")
     check_positive("diameter", diameter, "m")
     places = []
@@ -167,11 +180,17 @@ def clearance(x: Any, y: Any, yaw: Any, width: Any, length: Any, course: Course,
     The result is minus infinity if the drive does not go through the whole course. Positions between rows are not
     checked: 0.01 s at 100 km/h is 0.3 m.
 
-    **Raises** `InputError` for a size that is not positive.
+    **Raises** `InputError` for a size that is not positive, what is no course, or arrays of several shapes.
     """
+    _check_course(course)
+    check_single(width=width, length=length, centre=centre)
     check_positive("width", width, "m")
     check_positive("length", length, "m")
-    x, y, yaw = jnp.asarray(x), jnp.asarray(y), jnp.asarray(yaw)
+    x, y, yaw = (real_array(name, values) for name, values in (("x", x), ("y", y), ("yaw", yaw)))
+    if not x.shape == y.shape == yaw.shape or not x.size:
+        raise InputError(
+            f"x, y and yaw have the shapes {x.shape}, {y.shape} and {yaw.shape}: must be one, (T,), T at least 1."
+        )
     corners = _corners(x, y, yaw, width, length, centre)
     margins = [jnp.min(_margin(corners, lane)) for lane in course.lanes]
     whole = (jnp.min(x) <= course.lanes[0].start) & (jnp.max(x) >= course.lanes[-1].end)
@@ -207,6 +226,11 @@ def _within(y, lane: Lane, counts):
     return jnp.where(counts, jnp.minimum(lane.left - y, y - lane.right), jnp.inf)
 
 
+def _check_course(course: Any) -> None:
+    check_kind("course", course, Course, "Such as manoeuvres.iso_3888_1(width=1.8).")
+
+
 def _check(width, start) -> None:
+    check_single(width=width, start=start)
     check_positive("width", width, "m")
     check_finite("start", start)

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import check, check_at_least, check_key, check_positive
+from jaxveh._core.errors import check_at_least, check_key, check_positive, check_single, check_whole
 from jaxveh._core.parameter import parameter
 from jaxveh.manoeuvres.base import AbstractManoeuvre, PedalInputs, as_time, check_drive
 from jaxveh.manoeuvres.speeds import AbstractSpeed, SteadySpeed, wavering_speed
@@ -56,11 +56,12 @@ def cruise(
     **Raises** `InputError` for values out of range.
     """
     check_drive(speed, duration)
+    check_single(speed_time=speed_time, pedal_time=pedal_time)
     check_at_least("speed_std", speed_std, 0.0)
     check_at_least("pedal_noise", pedal_noise, 0.0)
     check_positive("speed_time", speed_time, "s")
     check_positive("pedal_time", pedal_time, "s")
-    check("count", count, lambda v: v >= 1, "at least 1")
+    check_whole("count", count)
     check_key("cruise", key)
     wander, foot = jax.random.split(key)
     held = not eqx.is_array(speed_std) and speed_std == 0

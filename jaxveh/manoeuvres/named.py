@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import jax
 
-from jaxveh._core.errors import check_one_of
-from jaxveh.manoeuvres.base import AbstractManoeuvre
+from jaxveh._core.errors import check_key, check_one_of
+from jaxveh.manoeuvres.base import AbstractManoeuvre, check_drive
 from jaxveh.manoeuvres.braking import braking_in_a_turn, mu_jump_braking
 from jaxveh.manoeuvres.courses import iso_lane_change, iso_obstacle_avoidance, slalom_course, steady_circle
 from jaxveh.manoeuvres.cruise import cruise
@@ -96,4 +96,7 @@ def named_manoeuvre(
     """
     check_one_of("manoeuvre", name, MANOEUVRES)
     check_options(name, options)
+    if key is not None:
+        check_key("named_manoeuvre", key)
+    check_drive(speed, 1.0, steer)
     return MANOEUVRES[name].make(DriveSettings(speed, steer, options, jax.random.key(0) if key is None else key))

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_positive, check_single
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.manoeuvres.base import DriverInputs
 from jaxveh.manoeuvres.driver import AbstractDriver, Motion, driver_state
@@ -63,6 +63,8 @@ class PathDriver(AbstractDriver):
             if not isinstance(getattr(self, name), kind):
                 given = type(getattr(self, name)).__name__
                 raise InputError(f"PathDriver.{name} = {given}: must be a {name} of jaxveh.manoeuvres.")
+        check_single(**{"PathDriver.duration": self.duration})
+        check_positive("PathDriver.duration", self.duration, "s")
 
     @property
     def state_names(self):

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, is_concrete
-from jaxveh._core.names import check_names, record_type
+from jaxveh._core.names import as_names, check_names, record_type
 from jaxveh._core.recording import Recording, check_recording
 from jaxveh.manoeuvres.base import AbstractManoeuvre
 from jaxveh.vehicles import kit
@@ -47,18 +47,19 @@ def replay(recording: Recording, channels: tuple[str, ...] | None = None) -> Rep
     if channels is None:
         more = ("a_x", *(name for name in kit.STEER_UNITS if name != "steer"))
         channels = ("steer", "v_x", *(name for name in more if name in recording))
-    check_names("replay", channels, recording.names)
+    names = as_names(channels, "replay: channels")
+    check_names("replay", names, recording.names)
     if len(recording) < 2:
         raise InputError(f"replay: the recording has {len(recording)} row(s); at least 2 are needed.")
     if not is_concrete(recording.time):
         raise InputError("replay: the recording's time is traced; make the replay outside jit (it sets the duration).")
-    for name in channels:
+    for name in names:
         _check_finite(recording, name)
-    values = tuple(jnp.asarray(recording[name]) for name in channels)
+    values = tuple(jnp.asarray(recording[name]) for name in names)
     stamps = np.asarray(recording.time, dtype=np.float64)
     # The time of the first row is subtracted before rounding, so that float32 resolves the steps of a long recording.
     time = jnp.asarray(stamps - stamps[0], values[0].dtype)
-    return Replay(duration=float(stamps[-1] - stamps[0]), time=time, values=values, names=tuple(channels))
+    return Replay(duration=float(stamps[-1] - stamps[0]), time=time, values=values, names=names)
 
 
 def _check_finite(recording: Recording, name: str) -> None:

@@ -35,7 +35,8 @@ class RecursiveLeastSquares(AbstractObserver):
             "RecursiveLeastSquares.forgetting", self.forgetting, lambda f: (f > 0) & (f <= 1), "above 0 and at most 1"
         )
         check("RecursiveLeastSquares.ceiling", self.ceiling, lambda c: c >= 1, "at least 1")
-        check("RecursiveLeastSquares.reset", self.reset, lambda r: r > 0, "positive")
+        if self.reset is not None:
+            check("RecursiveLeastSquares.reset", self.reset, lambda r: r > 0, "positive")
 
     def check(self, model):
         check_one_or_each("RecursiveLeastSquares.forgetting", self.forgetting, model.states)

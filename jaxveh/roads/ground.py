@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_finite, check_kind, real_array, word_for
 from jaxveh.roads.base import AbstractRoad
 
 
@@ -48,13 +49,14 @@ def under(road: AbstractRoad, x: Any, y: Any, yaw: Any, wheels: Sequence[tuple[A
         tan(grade_car) =  tan(grade) cos(yaw) + tan(bank) sin(yaw)
         tan(bank_car)  = -tan(grade) sin(yaw) + tan(bank) cos(yaw)
 
-    Elementwise in x, y and yaw. **Raises** `InputError` unless there are four wheels.
+    Elementwise in x, y and yaw. **Raises** `InputError` unless there are a road, four wheels, and numbers.
     """
-    if len(wheels) != 4:
-        raise InputError(f"wheels: {len(wheels)} positions; there must be 4 (front left, front right, rear left, ...).")
+    check_kind("road", road, AbstractRoad, "Such as roads.Level().")
+    x, y, yaw = (real_array(name, value) for name, value in (("x", x), ("y", y), ("yaw", yaw)))
     cosine, sine = numerics.cos(yaw), numerics.sin(yaw)
     stands = [
-        road.at(x + forward * cosine - left * sine, y + forward * sine + left * cosine) for forward, left in wheels
+        road.at(x + forward * cosine - left * sine, y + forward * sine + left * cosine)
+        for forward, left in _places(wheels)
     ]
     here = road.at(x, y)
     along, across = numerics.tan(here.grade), numerics.tan(here.bank)
@@ -62,3 +64,19 @@ def under(road: AbstractRoad, x: Any, y: Any, yaw: Any, wheels: Sequence[tuple[A
     bank = numerics.arctan(across * cosine - along * sine)
     friction, height = [at.friction for at in stands], [at.height for at in stands]
     return Ground(*jnp.broadcast_arrays(*friction, grade, bank, *height))
+
+
+def _places(wheels: Any) -> list[tuple[Any, Any]]:
+    """The four positions, each (forward, left)."""
+    try:
+        places = [tuple(place) for place in wheels]
+    except TypeError:
+        places = []
+    if len(places) != 4 or any(len(place) != 2 for place in places):
+        shown = f"{len(places)} positions" if places else word_for(wheels)
+        raise InputError(
+            f"wheels: {shown}; there must be 4 (front left, front right, rear left, ...), each (forward, left) in m."
+        )
+    for value in itertools.chain(*places):
+        check_finite("wheels", value)
+    return places

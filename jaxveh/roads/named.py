@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import jax
 
-from jaxveh._core.errors import InputError, did_you_mean
+from jaxveh._core.errors import InputError, check_key, did_you_mean, word_for
 from jaxveh.io import read_road
 from jaxveh.roads.base import AbstractRoad
 from jaxveh.roads.friction import Level, MuJump, SplitMu
@@ -49,7 +49,15 @@ ROADS: dict[str, NamedRoad] = {
 
 
 def from_specification(spec: Any) -> AbstractRoad:
-    """A road from the content of its file: `spec` is a `jaxveh.io.RoadSpecification`, or anything with its fields."""
+    """A road from the content of its file: `spec` is a `jaxveh.io.RoadSpecification`, or anything with its fields.
+
+    **Raises** `InputError` for what lacks one of them.
+    """
+    lacking = [name for name in ("distance", "friction", "grade", "bank", "interpolation") if not hasattr(spec, name)]
+    if lacking:
+        raise InputError(
+            f"spec = {word_for(spec)}: has no {', '.join(lacking)}; must be a jaxveh.io.RoadSpecification (io.read_road)."
+        )
     distance = (0.0, 1.0) if spec.distance is None else spec.distance
     table = lambda value: jax.numpy.asarray(value, float)
     return Profile(
@@ -64,6 +72,8 @@ def named_road(name: str | os.PathLike, key: jax.Array | None = None) -> Abstrac
 
     **Raises** `InputError` for an unknown name (it lists the known ones), or a file that does not describe a road.
     """
+    if key is not None:
+        check_key("named_road", key)
     if str(name) in ROADS:
         road = ROADS[str(name)]
         return road.make(key) if road.random else road.make()

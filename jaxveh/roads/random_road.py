@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_positive
+from jaxveh._core.errors import InputError, check, check_positive, check_single, check_whole
 from jaxveh._core.parameter import check_parameters, positive, table
 from jaxveh.numerics import band_harmonics, gauss_markov_harmonics, sum_of_harmonics
 from jaxveh.roads.base import AbstractRoad, Surface, place, surface
@@ -49,11 +49,13 @@ def gauss_markov(std, length: float, key: jax.Array, *, shortest: float | None =
 
     **Raises** `InputError` for values that are not positive.
     """
-    shortest = length / 5 if shortest is None else shortest
+    check_single(length=length)
     check_positive("std", std)
     check_positive("length", length, "m")
+    shortest = length / 5 if shortest is None else shortest
+    check_single(shortest=shortest)
     check_positive("shortest", shortest, "m")
-    _check_count(count)
+    check_whole("count", count)
     return Variation(std, *gauss_markov_harmonics(key, length, 1.0 / shortest, count))
 
 
@@ -64,10 +66,11 @@ def band(std, longest: float, shortest: float, key: jax.Array, *, count: int = 1
 
     **Raises** `InputError` for values that are not positive, or a `longest` that is not above `shortest`.
     """
+    check_single(longest=longest, shortest=shortest)
     check_positive("std", std)
     check_positive("shortest", shortest, "m")
     check("longest", longest, lambda v: v > shortest, f"above shortest = {shortest:g} m")
-    _check_count(count)
+    check_whole("count", count)
     return Variation(std, *band_harmonics(key, 1.0 / longest, 1.0 / shortest, count))
 
 
@@ -105,7 +108,3 @@ class RandomRoad(AbstractRoad):
 def _angle(value: jax.Array) -> jax.Array:
     """An angle within a quarter turn, however large the sum of harmonics is; 0.1 rad is reduced by one part in 700."""
     return (math.pi / 2) * jnp.tanh(value * (2 / math.pi))
-
-
-def _check_count(count: int) -> None:
-    check("count", count, lambda v: v >= 1, "at least 1")

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check, check_key, check_one_of, check_positive
+from jaxveh._core.errors import InputError, check, check_key, check_one_of, check_positive, check_single, check_whole
 from jaxveh._core.parameter import check_parameters, positive, table
 from jaxveh.roads.base import AbstractRoad, Surface, place, surface
 
@@ -81,9 +81,10 @@ def rough(
     if isinstance(roughness, str):
         check_one_of("roughness", roughness, tuple(ROUGHNESS))
         roughness = ROUGHNESS[roughness]
+    check_single(roughness=roughness, shortest=shortest, slant=slant)
     check_positive("roughness", roughness, "m^3")
     check("shortest", shortest, lambda v: (v > 0) & (v < LONGEST), f"above 0 and below {LONGEST:g} m")
-    check("count", count, lambda v: v >= 1, "at least 1")
+    check_whole("count", count)
     check("slant", slant, lambda v: v >= 0, "at least 0")
     check_key("rough", key)
     shares, turns, ways = jax.random.split(key, 3)

@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_at_least, check_finite, check_key, check_positive
+from jaxveh._core.errors import InputError, check_at_least, check_finite, check_key, check_positive, check_single
 from jaxveh._core.names import as_mapping
 from jaxveh.statespace import cast
 
@@ -110,18 +110,27 @@ class AbstractDevice(eqx.Module):
         return seen
 
 
+def _as_float(value: Any) -> Any:
+    """A Python float, which a static field must be; what is none is left to the check that knows its name."""
+    try:
+        return value if isinstance(value, str) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        return value
+
+
 class AbstractInstrument(AbstractDevice):
     """A device with its own clock, as opposed to one that wraps another device.
 
     **Raises** `InputError` for a rate that is not positive, or a negative delay or phase.
     """
 
-    rate: float = eqx.field(static=True, converter=float, kw_only=True)
-    delay: float = eqx.field(static=True, converter=float, kw_only=True, default=0.0)
-    phase: float = eqx.field(static=True, converter=float, kw_only=True, default=0.0)
+    rate: float = eqx.field(static=True, converter=_as_float, kw_only=True)
+    delay: float = eqx.field(static=True, converter=_as_float, kw_only=True, default=0.0)
+    phase: float = eqx.field(static=True, converter=_as_float, kw_only=True, default=0.0)
 
     def __check_init__(self):
         name = name_of(self)
+        check_single(**{f"{name}.{field}": getattr(self, field) for field in ("rate", "delay", "phase")})
         check_positive(f"{name}.rate", self.rate, "Hz")
         for field in ("delay", "phase"):
             check_at_least(f"{name}.{field}", getattr(self, field), 0.0)

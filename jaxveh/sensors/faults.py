@@ -3,7 +3,7 @@
 # No postponed annotations here: equinox does not recognise an AbstractVar in a string.
 
 import abc
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import equinox as eqx
@@ -11,8 +11,8 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check, is_concrete
-from jaxveh._core.names import check_names
+from jaxveh._core.errors import InputError, check, check_kind, is_concrete
+from jaxveh._core.names import as_names, check_names
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.sensors.device import AbstractDevice, name_of
 from jaxveh.sensors.randomness import subkey
@@ -23,7 +23,8 @@ Channels = dict[str, jax.Array]
 
 
 def _names(channel) -> tuple[str, ...]:
-    return (channel,) if isinstance(channel, str) else tuple(channel)
+    check_kind("channel", channel, Iterable, "A channel's name, or several.")
+    return as_names(channel)
 
 
 def _names_or_none(channel) -> tuple[str, ...] | None:
@@ -89,7 +90,7 @@ class Stuck(AbstractFault):
     end: jax.Array | None = parameter("s", default=None)
 
     def __check_init__(self):
-        if is_concrete(self.start):
+        if self.end is not None and is_concrete(self.start):
             check("Stuck.end", self.end, lambda end: end > self.start, f"after start = {self.start} s")
 
     def spoil(self, times: jax.Array, said: Channels, key: Any) -> Channels:
@@ -145,7 +146,8 @@ class Dropout(AbstractFault):
 
     def __check_init__(self):
         check_spans("Dropout.spans", self.spans)
-        check("Dropout.probability", self.probability, lambda p: (p >= 0) & (p <= 1), "between 0 and 1")
+        if self.probability is not None:
+            check("Dropout.probability", self.probability, lambda p: (p >= 0) & (p <= 1), "between 0 and 1")
         if not self.spans and self.probability is None:
             raise InputError("Dropout: has neither spans nor a probability; give at least one of them.")
 

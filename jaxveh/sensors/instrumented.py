@@ -6,6 +6,7 @@ from typing import Any
 
 import equinox as eqx
 
+from jaxveh._core.errors import check_kind
 from jaxveh._core.names import check_names, record_type
 from jaxveh._core.parameter import UNNAMED
 from jaxveh.sensors.sensor_set import SensorSet
@@ -17,10 +18,17 @@ class Instrumented(eqx.Module):
 
     It is elementwise, like the vehicle. `Propagate(Instrumented.derivatives)` is its transition in a filter. Without
     sensors it is the vehicle only, without measurements.
+
+    **Raises** `InputError` for what is no vehicle, or no set of sensors.
     """
 
     vehicle: AbstractVehicle = eqx.field(metadata=UNNAMED)
     sensors: SensorSet | None = None
+
+    def __check_init__(self):
+        check_kind("Instrumented.vehicle", self.vehicle, AbstractVehicle, "Such as vehicles.passenger_car().")
+        if self.sensors is not None:
+            check_kind("Instrumented.sensors", self.sensors, SensorSet, "Such as sensors.esc().")
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import equinox as eqx
@@ -11,10 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check_one_of, check_positive, is_concrete
-from jaxveh._core.names import check_names
+from jaxveh._core.errors import InputError, check_kind, check_one_of, check_positive, check_single, is_concrete
+from jaxveh._core.names import as_names, check_names
 from jaxveh._core.parameter import positive
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, check_recording
 
 _DAMPING = math.sqrt(0.5)
 
@@ -85,8 +86,11 @@ def low_pass(recording: Recording, channels, cutoff_hz: float = 20.0, order: int
     **Raises** `InputError` for an unknown channel, one that is not finite throughout, a cutoff that is not positive
     or an order other than 1 and 2.
     """
-    channels = (channels,) if isinstance(channels, str) else tuple(channels)
+    check_recording("low_pass", recording)
+    check_kind("low_pass: channels", channels, Iterable, "A channel's name, or several.")
+    channels = as_names(channels)
     check_names("low_pass", channels, recording.names)
+    check_single(cutoff_hz=cutoff_hz)
     if isinstance(recording.time, np.ndarray):
         steps = np.diff(recording.time)
     else:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from jaxveh._core.errors import check_one_of
+from jaxveh._core.errors import check_kind, check_one_of
 from jaxveh.sensors.sensor_set import SensorSet, esc
 from jaxveh.sensors.suite import Suite
 from jaxveh.sensors.typical import production_car, proving_ground_car
 from jaxveh.statespace import Gaussian
-from jaxveh.vehicles import kit
+from jaxveh.vehicles import AbstractVehicle, kit
 
 
 class NamedDevices(NamedTuple):
@@ -51,6 +51,9 @@ def named_devices(name: str, car: Any, noise: Mapping[str, Any] | None = None) -
     other channels of the car may be named, too). **Raises** `InputError` for an unknown name.
     """
     check_one_of("devices", name, DEVICES)
+    check_kind("car", car, AbstractVehicle, "Such as vehicles.passenger_car().")
+    if noise is not None:
+        check_kind("noise", noise, Mapping, "Standard deviations by channel.")
     return DEVICES[name].make(car, noise or {})
 
 

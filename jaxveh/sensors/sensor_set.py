@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check_finite
+from jaxveh._core.errors import InputError, check_finite, check_kind, check_single
 from jaxveh._core.names import check_names, record_type
 from jaxveh._core.parameter import parameter
 from jaxveh.sensors.low_pass import LowPass
@@ -50,6 +51,7 @@ class SensorSet(eqx.Module):
     def __check_init__(self):
         if not isinstance(self.noise, Gaussian):
             raise InputError(f"SensorSet.noise = {type(self.noise).__name__}: must be a Gaussian by channel name.")
+        check_kind("SensorSet.position", self.position, Position, "Such as sensors.Position(x=0.5).")
         if not (self.low_pass is None or isinstance(self.low_pass, LowPass)):
             raise InputError(f"SensorSet.low_pass = {self.low_pass!r}: must be a LowPass(cutoff_hz) or None.")
 
@@ -138,6 +140,12 @@ def esc(
     fitted = {name: std for name, std in fitted.items() if std is not None}
     if not fitted:
         raise InputError("esc: no channel is fitted; give at least one of them a standard deviation.")
-    if len(position) != 3:
-        raise InputError(f"esc: position = {position!r}: must be (x, y, z) in m from the centre of gravity.")
-    return SensorSet(Gaussian(fitted), Position(*position), low_pass)
+    return SensorSet(Gaussian(fitted), position_of("position", position), low_pass)
+
+
+def position_of(name: str, place: Any) -> Position:
+    """The position (x, y, z), m; raises `InputError` for what are no three numbers."""
+    if isinstance(place, str) or not isinstance(place, Iterable) or len(place := tuple(place)) != 3:
+        raise InputError(f"{name} = {place!r}: must be (x, y, z) in m from the centre of gravity.")
+    check_single(**{f"{name}: {axis}": value for axis, value in zip("xyz", place, strict=True)})
+    return Position(*place)

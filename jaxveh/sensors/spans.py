@@ -14,17 +14,20 @@ _LATE = 1e-9  # s: time stamps that should be equal may differ by rounding
 
 
 def as_spans(spans) -> tuple[tuple[float, float], ...]:
-    """Spans as a static tuple of pairs of floats; a single pair is one span."""
-    spans = tuple(spans)
-    if len(spans) == 2 and not any(hasattr(end, "__len__") for end in spans):
-        spans = (spans,)
-    return tuple(tuple(float(end) for end in span) for span in spans)  # type: ignore[misc]
+    """Spans as a static tuple of pairs of floats; a single pair is one span. What is none is left to `check_spans`."""
+    try:
+        pairs = tuple(spans)
+        if len(pairs) == 2 and not any(hasattr(end, "__len__") for end in pairs):
+            pairs = (pairs,)
+        return tuple(tuple(float(end) for end in span) for span in pairs)  # type: ignore[misc]
+    except (TypeError, ValueError):
+        return spans
 
 
 def check_spans(name: str, spans) -> None:
     """Raise `InputError` unless every span is a pair with a finite start before its end."""
-    for span in spans:
-        if len(span) != 2 or not (math.isfinite(span[0]) and span[0] < span[1]):
+    for span in spans if isinstance(spans, tuple) else (spans,):
+        if not isinstance(span, tuple) or len(span) != 2 or not (math.isfinite(span[0]) and span[0] < span[1]):
             raise InputError(f"{name} = {span}: must be pairs (start, end) in s, with start before end.")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_key, is_concrete
+from jaxveh._core.errors import InputError, check_key, check_kind, is_concrete
 from jaxveh._core.names import as_mapping
 from jaxveh.sensors.device import AbstractDevice, check_outputs, name_of
 from jaxveh.sensors.randomness import subkey
@@ -47,7 +47,9 @@ class Suite(eqx.Module):
         said: dict[str, str] = {}
         for place, device in enumerate(self.devices):
             if not isinstance(device, AbstractDevice):
-                raise InputError(f"Suite: device {place} = {device!r}: must be a device, such as IMU(rate=100.0).")
+                raise InputError(
+                    f"Suite.devices: device {place} = {device!r}: must be a device, such as IMU(rate=100.0)."
+                )
             for channel in device.channels:
                 if channel in said:
                     raise InputError(
@@ -139,7 +141,10 @@ def device_keys(devices: tuple[AbstractDevice, ...], key: Any) -> list:
 
 
 def _as_tuple(devices) -> tuple:
-    return (devices,) if isinstance(devices, AbstractDevice) else tuple(devices)
+    if isinstance(devices, AbstractDevice):
+        return (devices,)
+    check_kind("Suite.devices", devices, Iterable, "A device, or several.")
+    return tuple(devices)
 
 
 @eqx.filter_jit

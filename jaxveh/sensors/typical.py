@@ -8,7 +8,7 @@ from jaxveh.sensors.gnss import GNSS
 from jaxveh.sensors.imu import IMU
 from jaxveh.sensors.low_pass import LowPass
 from jaxveh.sensors.optical import OpticalSideslip
-from jaxveh.sensors.sensor_set import Position
+from jaxveh.sensors.sensor_set import position_of
 from jaxveh.sensors.signal import Signal
 from jaxveh.sensors.steering_angle import SteeringAngle
 from jaxveh.sensors.suite import Suite
@@ -69,7 +69,7 @@ def proving_ground_car(
     velocity = Signal(noise=0.05, scale=2e-3)
     wheels = () if wheel_radius is None else (_wheels(wheel_radius),)
     inertial = IMU(axes, low_pass=LowPass(40.0), rate=100.0, delay=0.002)
-    place = Position(*optical_position)
+    place = position_of("optical_position", optical_position)
     optical = OpticalSideslip({"v_x": velocity, "v_y": velocity}, place, lowest=0.3, rate=250.0, delay=0.006)
     satellites = GNSS(along=0.02, across=0.02, lowest=0.3, position=Signal(noise=0.02), rate=20.0, delay=0.02)
     return Suite((inertial, optical, _steering(steering_ratio), satellites, *wheels))

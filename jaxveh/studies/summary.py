@@ -39,7 +39,7 @@ def plain_values(found: Swept, names: Iterable[str] = ()) -> list[str]:
     dims = len(found.design.axes) + 1
     there = [name for name in found.values if np.ndim(found.values[name]) == dims]
     for name in names:
-        kit.check_known("--values", "value", name, there)
+        kit.check_known("sweep", "value", name, there)
     return list(names) or there
 
 

@@ -75,7 +75,8 @@ def sweep(
     and a store that was begun with something else or that another sweep is writing.
     **Warns** if a program may never end even on one device, with the remedy.
     """
-    check_positive("patience", patience, "s")
+    if patience is not None:
+        check_positive("patience", patience, "s")
     if store is not None or (client, processes, part) != (None, None, None):
         if store is None or (memory, devices) != (None, None):
             raise InputError(
@@ -120,8 +121,8 @@ def _all(one, given: Given, batch, memory, devices, report, late) -> dict[str, n
 
 def _program(one, given: Given, batch, memory, devices):
     """The compiled program of a chunk, and its number of runs: fewer than `batch` if they would not fit into memory."""
-    check_positive("memory", memory, "bytes")
     memory = SHARE_OF_MEMORY * _machine_memory() if memory is None else memory
+    check_positive("memory", memory, "bytes")
     while True:
         width = len(devices)
         batch = -(-batch // width) * width

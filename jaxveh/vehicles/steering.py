@@ -126,10 +126,9 @@ class FourWheelSteering(AbstractSteering):
     def __check_init__(self):
         check_parameters(self)
         for name in ("rear_ratio", "fast_ratio"):
-            value = getattr(self, name)
-            check(
-                f"FourWheelSteering.{name}", value, lambda v: (v >= -5) & (v <= 5), "between -5 and 5 (rear over front)"
-            )
+            value, what = getattr(self, name), f"FourWheelSteering.{name}"
+            if value is not None:
+                check(what, value, lambda v: (v >= -5) & (v <= 5), "between -5 and 5 (rear over front)")
 
     def ratio(self, v_x: Any) -> Any:
         """The rear angle over the front angle (-) at the forward speed `v_x` (m/s)."""

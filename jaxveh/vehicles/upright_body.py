@@ -27,7 +27,8 @@ class AbstractUprightTwoTrack(AbstractLoadedTwoTrack):
 
     def __check_init__(self):
         name = f"{type(self).__name__}.front_roll_share"
-        check(name, self.front_roll_share, lambda v: (v >= 0) & (v <= 1), "between 0 and 1")
+        if self.front_roll_share is not None:
+            check(name, self.front_roll_share, lambda v: (v >= 0) & (v <= 1), "between 0 and 1")
 
     def motion(self, x, u):
         return Motion(0.0, 0.0, x.yaw, self.told_or_own_speed(x, u), x.v_y, x.yaw_rate)

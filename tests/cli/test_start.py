@@ -1,12 +1,18 @@
 """How the command starts: flags, precision, missing libraries, as a process of its own."""
 
+import ast
 import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import jax
+import typer
 
+import jaxveh
 from jaxveh.cli import prepare
+from jaxveh.cli.app import app
 
 SETTINGS = "print(os.environ.get('XLA_FLAGS'), jax.config.jax_enable_x64)"
 PROBE = f"import jaxveh, jaxveh.cli, os, jax; {SETTINGS}; jaxveh.cli.prepare(); {SETTINGS}"
@@ -45,3 +51,26 @@ def test_bad_input_as_a_process(tmp_path):
     assert result.stdout == ""
     assert result.stderr.startswith(f"error: {tmp_path / 'missing.csv'}: cannot be read")
     assert len(result.stderr.splitlines()) == 1
+
+
+OTHERS = {"--xla_cpu_prefer_vector_width", "--minutes", "--cars"}
+"""Options of XLA, and of a study that is run as a module."""
+
+
+def options_of(command):
+    """Every option of a program and of those below it."""
+    below = getattr(command, "commands", {}).values()
+    return {one for parameter in command.params for one in parameter.opts}.union(*map(options_of, below))
+
+
+def test_every_option_that_a_text_names_is_one():
+    """`--values` for `--value` sent users to an option that no program has."""
+    there, lost = options_of(typer.main.get_command(app)) | {"--help"} | OTHERS, []
+    assert {"--value", "--steer-deg", "--car-file"} <= there
+    for path in Path(jaxveh.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                lost += [
+                    (path.name, one) for one in re.findall(r"(?<![-\w])--[a-z][\w-]+", node.value) if one not in there
+                ]
+    assert not lost

@@ -157,7 +157,8 @@ def test_bijectors_refuse_what_lies_outside():
 
 def test_checks_skip_tracers_and_name_the_value():
     assert jax.jit(lambda v: (check_positive("v", v), v)[1])(-1.0) == -1.0
-    assert check_positive("v", None) is None
+    with pytest.raises(InputError, match=r"v = None: must be a real number, positive and finite\."):
+        check_positive("v", None)
     for act, message in (
         (
             lambda: check_positive("mass", -2.0, "kg", "Look."),

@@ -41,6 +41,7 @@ def test_a_parameter_of_one_s_own_is_checked(name, size):
 
 
 NO_NUMBERS = {
+    "none": None,
     "text": "8.0",
     "complex": 8j,
     "an array of text": np.array("8.0"),
@@ -64,7 +65,9 @@ CHECKS = {
     name: function for name, function in vars(errors).items()
     if name.startswith("check") and list(inspect.signature(function).parameters)[:2] == ["name", "value"]
 }  # fmt: skip
-MORE = {"check": (lambda v: v > 0, "positive"), "check_at_least": (1,), "check_one_of": ((1, 2),)}
+MORE = {
+    "check": (lambda v: v > 0, "positive"), "check_at_least": (1,), "check_one_of": ((1, 2),), "check_kind": (int,),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", NO_NUMBERS)

@@ -252,7 +252,7 @@ def test_clearance_has_finite_gradients():
         (lambda: manoeuvres.cones(COURSE, spacing=0.0), r"spacing = 0\.0: must be positive"),
         (lambda: manoeuvres.clearance(0.0, 0.0, 0.0, -1.0, 4.0, COURSE), r"width = -1\.0: must be positive"),
         (lambda: manoeuvres.slalom_cones(diameter=0.0), r"diameter = 0\.0: must be positive"),
-        (lambda: manoeuvres.slalom_course(15.0, count=1), r"count = 1: must be at least 2 cones"),
+        (lambda: manoeuvres.slalom_course(15.0, count=1), r"count = 1: must be a whole number of at least 2"),
         (lambda: manoeuvres.iso_lane_change(0.0), r"speed = 0\.0: must be positive"),
     ],
 )  # fmt: skip

@@ -129,7 +129,7 @@ def test_changing_speed_rises_linearly_between_its_corners():
         (lambda: manoeuvres.slalom(22.0, 0.1, frequency=0.0), r"frequency = 0\.0: must be positive"),
         (lambda: manoeuvres.slalom(-22.0, 0.1), r"speed = -22\.0: must be between 0 and 150 m/s"),
         (lambda: manoeuvres.random_steering(22.0, 0.1, KEY, highest=0.05), r"highest = 0\.05: must be above lowest = 0\.1"),
-        (lambda: manoeuvres.random_steering(22.0, 0.1, KEY, count=0), r"count = 0: must be at least 1"),
+        (lambda: manoeuvres.random_steering(22.0, 0.1, KEY, count=0), r"count = 0: must be a whole number of at least 1"),
         (lambda: manoeuvres.random_steering(22.0, 0.1, KEY, edge=40.0), r"edge = 40\.0: must be at most half the duration"),
         (lambda: manoeuvres.braking_in_a_turn(22.0, 0.1, -5.0), r"deceleration = -5\.0: must be positive"),
         (lambda: manoeuvres.braking_in_a_turn(22.0, 0.1, brake_at=1.0), r"brake_at = 1\.0: must be at least start \+ ramp"),

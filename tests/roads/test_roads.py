@@ -120,7 +120,7 @@ TWO = [0.0, 1.0]
         (lambda: roads.Variation(0.1, TWO, [0.0]), r"wavenumbers have the shape \(2,\), phases \(1,\)"),
         (lambda: roads.gauss_markov(0.1, -5.0, jax.random.key(0)), r"length = -5\.0: must be positive"),
         (lambda: roads.band(0.1, 5.0, 9.0, jax.random.key(0)), r"longest = 5\.0: must be above shortest = 9"),
-        (lambda: roads.band(0.1, 9.0, 5.0, jax.random.key(0), count=0), r"count = 0: must be at least 1"),
+        (lambda: roads.band(0.1, 9.0, 5.0, jax.random.key(0), count=0), r"count = 0: must be a whole number of at least 1"),
         (lambda: roads.named_road("icy"), r"road = 'icy': must be one of level, wet, ice"),
         (lambda: roads.under(roads.Level(), 0.0, 0.0, 0.0, [(1.0, 1.0)]), r"wheels: 1 positions; there must be 4"),
     ],

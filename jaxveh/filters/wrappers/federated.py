@@ -99,7 +99,8 @@ class Federated(AbstractWrapper):
             check("Federated.shares", self.shares, lambda _: fine, "positive, with the sum 1")
         if self.common and (not self.reset or self.shares is not None or self.by_trace):
             raise InputError("Federated.common: shares and by_trace must not be given with it, and reset must be True.")
-        check("Federated.isolate", self.isolate, lambda v: v > 1, "above 1")
+        if self.isolate is not None:
+            check("Federated.isolate", self.isolate, lambda v: v > 1, "above 1")
         check("Federated.forgetting", self.forgetting, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
 
     def check(self, model):

@@ -100,8 +100,12 @@ class InteractingModels(AbstractWrapper):
         if r < 2:
             raise InputError(f"InteractingModels.variants has {r} member(s): must be at least two.")
         for name, value, shape in (("transition", self.transition, (r, r)), ("start", self.start, (r,))):
-            if value is not None and value.shape != shape:
-                raise InputError(f"InteractingModels.{name} has shape {value.shape}: must be {shape} for {r} variants.")
+            if value is None and name == "start":
+                continue
+            if np.shape(value) != shape:
+                raise InputError(
+                    f"InteractingModels.{name} has shape {np.shape(value)}: must be {shape} for {r} variants."
+                )
             stochastic = lambda p: (p >= 0).all() and bool(np.all(np.abs(np.sum(p, -1) - 1) < 1e-6))
             check(f"InteractingModels.{name}", value, stochastic, "probabilities whose rows sum to 1")
 

@@ -142,7 +142,8 @@ def check_settings(settings: Any) -> None:
     check(f"{who}.floor", settings.floor, lambda v: (v > 0) & (v <= 1), "above 0 and at most 1")
     check(f"{who}.ceiling", settings.ceiling, lambda v: v >= 1, "at least 1")
     inside = f"from 2 to the window, {settings.window}; None: the whole window"
-    check(f"{who}.fewest", settings.fewest, lambda v: (v >= 2) & (v <= settings.window), inside)
+    if settings.fewest is not None:
+        check(f"{who}.fewest", settings.fewest, lambda v: (v >= 2) & (v <= settings.window), inside)
     within = lambda v: (v >= settings.floor) & (v <= settings.ceiling)
     check(f"{who}.initial", settings.initial, within, f"from floor, {settings.floor}, to ceiling, {settings.ceiling}")
 

@@ -119,7 +119,10 @@ class CarNumbers:
         for name in ("front_drive", "front_brake"):
             check(f"{self.name}: {name}", getattr(self, name), lambda v: (v >= 0) & (v <= 1), "between 0 and 1")
         for name in ("drag", "rolling_resistance"):
-            check(f"{self.name}: {name}", getattr(self, name), lambda v: (v >= 0) & (v < 1e6), "at least 0 and finite")
+            if getattr(self, name) is not None:
+                check(
+                    f"{self.name}: {name}", getattr(self, name), lambda v: (v >= 0) & (v < 1e6), "at least 0 and finite"
+                )
 
     @property
     def wheelbase(self) -> float:
