@@ -73,7 +73,22 @@ def as_names(values, what: str = "names") -> Any:
 
 def as_groups(values) -> Any:
     """Return groups of names as a tuple of tuples; a single name is a group. None stays None."""
-    return None if values is None else tuple(as_names(group) for group in values)
+    return None if values is None else tuple(as_names(group, "groups") for group in as_several(values, "groups"))
+
+
+def as_several(values, what: str) -> tuple:
+    """Return several things as a tuple; raises `InputError` for what are none."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise InputError(f"{what} = {word_for(values)}: must be several, such as a tuple.")
+    return tuple(values)
+
+
+def as_pairs(values, what: str) -> tuple[tuple[str, Any], ...]:
+    """Return a mapping, or its pairs, as a static tuple of pairs; raises `InputError` for anything else."""
+    try:
+        return tuple(dict(values).items())
+    except (TypeError, ValueError):
+        raise InputError(f"{what} = {word_for(values)}: must be a mapping from names to values.") from None
 
 
 def check_names(what: str, names: Iterable[str], allowed: Iterable[str]) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from jaxveh._core.bijectors import AbstractBijector, Positive, Real
 from jaxveh._core.errors import InputError, check_finite, check_positive, did_you_mean, float_array
 from jaxveh._core.names import check_names
+from jaxveh._core.parts import check_parts
 
 Where = Callable[..., object]
 """Picks array leaves, as in `equinox.tree_at`: `lambda car: (car.front.B, car.rear.B)`.
@@ -65,8 +66,10 @@ def positive(unit: str = "-", **kwargs):
 def check_parameters(module: eqx.Module) -> None:
     """Raise `InputError` unless every declared parameter of a module is finite, and positive if declared positive.
 
-    For use in `__check_init__`; an option that is off (None, if that is its default) passes, and so do tracers.
+    A field that holds a module or a NamedTuple must have one of the kinds that its annotation names. For use in
+    `__check_init__`; an option that is off (None, if that is its default) passes, and so do tracers.
     """
+    check_parts(module)
     for field in dataclasses.fields(module):
         value, domain = getattr(module, field.name), field.metadata.get("domain")
         if domain is None or (value is None and field.default is None):

@@ -56,7 +56,7 @@ def fit(
     sources = (*logs, vehicle, channels)
     check_product(product, (".toml",), force, sources)
     check_product(car_file, (".toml",), force, sources, "--car-file")
-    if car_file is not None and car_file.absolute() == product.absolute():
+    if car_file is not None and car_file.resolve() == product.resolve():
         raise InputError(f"--car-file {car_file}: is the file of the calibration, -o; name another file.")
     check_report(out, numbers)
     car, uses = car_of(vehicle), tuple(calibrate_on or ())

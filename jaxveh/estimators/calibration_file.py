@@ -104,6 +104,7 @@ def read_calibration(path: str | os.PathLike) -> Calibration:
     """
     path = Path(path)
     content = kit.read_toml(path)
+    kit.check_file(path, content, "calibration", KEYS)
     kit.check_keys(str(path), content, KEYS)
     missing = [key for key in KEYS if key not in content and key not in ("reference", "options")]
     if missing:
@@ -191,6 +192,8 @@ def _check_pair(p: Parameter, value: float, line: float) -> None:
 
 def _is_positive(half: np.ndarray) -> bool:
     """Whether the matrix of this lower half is a covariance: the bands of an estimate take its root."""
+    if not np.isfinite(half).all():
+        return False
     try:
         np.linalg.cholesky(half + np.tril(half, -1).T)
     except np.linalg.LinAlgError:

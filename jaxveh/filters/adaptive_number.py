@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check, check_positive
-from jaxveh._core.names import check_names
+from jaxveh._core.errors import InputError, check, check_positive, check_whole
+from jaxveh._core.names import as_pairs, as_several, check_names
 from jaxveh.filters.choosing import check_ancestors, gather
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, check_all_particles
 from jaxveh.statespace import AbstractWrapper
@@ -60,8 +60,9 @@ class AdaptiveNumber(AbstractWrapper):
         check_all_particles("AdaptiveNumber", inner)
         n = inner.particles
         self.inner, self.error, self.confidence = inner, error, confidence
-        self.bins = tuple(sorted(dict(bins).items()))
-        self.sizes = tuple(sizes) if sizes is not None else tuple(max(2, n // part) for part in (8, 4, 2, 1))
+        self.bins = tuple(sorted(as_pairs(bins, "AdaptiveNumber.bins")))
+        usual = tuple(max(2, n // part) for part in (8, 4, 2, 1))
+        self.sizes = usual if sizes is None else as_several(sizes, "AdaptiveNumber.sizes")
 
     def __check_init__(self):
         for name, width in self.bins:
@@ -70,6 +71,8 @@ class AdaptiveNumber(AbstractWrapper):
         check("AdaptiveNumber.confidence", self.confidence, lambda v: (v > 0) & (v < 1), "between 0 and 1")
         if not self.bins:
             raise InputError("AdaptiveNumber.bins is empty: give the width of at least one state's bins.")
+        for size in self.sizes:
+            check_whole("AdaptiveNumber.sizes", size)
         if sorted(set(self.sizes)) != list(self.sizes) or self.sizes[-1] != self.inner.particles or self.sizes[0] < 2:
             raise InputError(
                 f"AdaptiveNumber.sizes = {self.sizes}: must rise from at least 2 to the filter's {self.inner.particles}."

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_positive, check_whole
-from jaxveh._core.names import check_names
+from jaxveh._core.names import as_pairs, check_names
 from jaxveh._core.result import Result, code
 from jaxveh.filters.outer_belief import AbstractTransparentBelief, either
 from jaxveh.statespace import AbstractFilter, AbstractWrapper, Gradient, Info, Row, StateSpace, kit
@@ -54,7 +54,7 @@ class Delayed(AbstractWrapper):
         return Gradient.exact
 
     def __init__(self, inner: AbstractFilter, delays: Mapping[str, float] | None = None, depth: int = 20):
-        self.inner, self.delays, self.depth = inner, tuple(sorted((delays or {}).items())), depth
+        self.inner, self.delays, self.depth = inner, tuple(sorted(as_pairs(delays or {}, "Delayed.delays"))), depth
 
     def __check_init__(self):
         for name, delay in self.delays:

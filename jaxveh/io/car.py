@@ -13,7 +13,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, check, check_one_of
 from jaxveh.io.car_table import CarTable
 from jaxveh.io.files import write_text
-from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
+from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text
 
 CAR_SCHEMA = """\
 # A car. SI units; axes x forward, y left, z up; steer positive to the left.
@@ -216,7 +216,9 @@ def read_car(path: str | os.PathLike) -> CarSpecification:
     similar ones), or a value with its allowed range.
     """
     path = Path(path)
-    return car_of_toml(read_toml(path), str(path), path.parent)
+    content = read_toml(path)
+    check_file(path, content, "car", [entry.name for entry in fields(CarSpecification)])
+    return car_of_toml(content, str(path), path.parent)
 
 
 def car_of_toml(content: Mapping[str, Any], where: str, folder: Path) -> CarSpecification:

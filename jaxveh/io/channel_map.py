@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxveh._core.errors import InputError, check, check_finite, check_one_of
-from jaxveh.io.toml import check_keys, read_toml, shorten, toml_number, toml_text
+from jaxveh.io.toml import check_file, check_keys, read_toml, shorten, toml_number, toml_text
 
 CHANNEL_MAP_SCHEMA = """\
 # A channel map. Everything but `column` is optional.
@@ -110,7 +110,9 @@ def read_channel_map(path: str | os.PathLike) -> ChannelMap:
     """
     path = Path(path)
     content = read_toml(path)
-    check_keys(str(path), content, ("time", "channels", "csv"))
+    keys = ("time", "channels", "csv")
+    check_file(path, content, "channel map", keys)
+    check_keys(str(path), content, keys)
     csv = content.get("csv", {})
     check_keys(f"{path}: [csv]", csv, ("separator", "decimal", "names_line", "encoding"))
     channels = content.get("channels", {})

@@ -10,12 +10,13 @@ from jaxveh.io.property_file import PROPERTY_UNITS, Entry, parse_property_file
 from jaxveh.io.result_files import RESULT_SUFFIXES, load_result, save_result
 from jaxveh.io.rig_table import RIG_CHANNELS
 from jaxveh.io.steering import check_front_steered
-from jaxveh.io.toml import check_keys, read_toml, shorten, toml_number, toml_string, toml_text
+from jaxveh.io.toml import FILES, check_file, check_keys, read_toml, shorten, toml_number, toml_string, toml_text
 from jaxveh.io.units import is_unit, same_unit
 
 __all__ = [
     "CAR_SCHEMA",
     "CHANNEL_MAP_SCHEMA",
+    "FILES",
     "MCAP_SUFFIX",
     "PROPERTY_UNITS",
     "RESULT_SUFFIXES",
@@ -24,6 +25,7 @@ __all__ = [
     "Entry",
     "car_lines",
     "car_of_toml",
+    "check_file",
     "check_front_steered",
     "check_keys",
     "check_known",

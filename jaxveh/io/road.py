@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_one_of
 from jaxveh.io.files import write_text
-from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
+from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text
 
 ROAD_SCHEMA = """\
 # A road along the x axis. SI units; y left, z up.
@@ -86,7 +86,9 @@ def read_road(path: str | os.PathLike) -> RoadSpecification:
     """
     path = Path(path)
     content = read_toml(path)
-    check_keys(str(path), content, [entry.name for entry in fields(RoadSpecification)])
+    names = [entry.name for entry in fields(RoadSpecification)]
+    check_file(path, content, "road", names)
+    check_keys(str(path), content, names)
     try:
         return RoadSpecification(**{key: _value(key, value) for key, value in content.items()})
     except InputError as error:

@@ -43,6 +43,25 @@ def _line(text: str, told: str) -> str:
     return f": {line}; lines are `key = value`, with decimal points, texts in quotes, and # before comments"
 
 
+FILES = {
+    "calibration": ({"estimator", "parameters"}, "a calibration (jaxveh fit -o; it is read by --calibration)"),
+    "study": ({"drive"}, "a study (it is read by jaxveh sweep)"),
+    "channel map": ({"channels"}, "a channel map (it is read by --channels)"),
+    "tyre": ({"tyre"}, "a tyre's parameter file"),
+    "car": ({"mass", "front_axle_to_cg"}, "a car's file (it is read by --vehicle)"),
+    "road": ({"friction"}, "a road's file (it is read by --road)"),
+}
+"""The files of this format by their kind: keys that a file of the kind has, and what it is in words."""
+
+
+def check_file(path: Path, content: Mapping[str, Any], kind: str, allowed: Iterable[str]) -> None:
+    """Raise `InputError` if a file has keys that are not allowed and is of another kind, which the message tells."""
+    strange = set(content) - set(allowed)
+    for other, (marks, words) in FILES.items():
+        if strange and other != kind and marks <= set(content):
+            raise InputError(f"{path}: is {words}; a {kind} file is needed here.")
+
+
 def check_keys(where: str, table: object, allowed: Iterable[str]) -> None:
     """Raise `InputError` unless `table` is a table whose keys are all allowed."""
     if not isinstance(table, Mapping):

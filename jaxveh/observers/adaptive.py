@@ -11,18 +11,18 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_at_least, check_positive
-from jaxveh._core.names import check_names
+from jaxveh._core.names import as_pairs, check_names
 from jaxveh.observers.base import AbstractObserver, advance, check_gain, observe
 from jaxveh.observers.luenberger import array
 from jaxveh.statespace import StateSpace, kit
 
 
 def _gains(given: Mapping[str, Any]) -> dict[str, jax.Array]:
-    return {name: array(value) for name, value in dict(given).items()}
+    return {name: array(value) for name, value in as_pairs(given, "Adaptive.rate")}
 
 
 def _bounds(given: Mapping[str, tuple[float, float]]) -> tuple[tuple[str, float, float], ...]:
-    return tuple((name, float(low), float(high)) for name, (low, high) in dict(given).items())
+    return tuple((name, float(low), float(high)) for name, (low, high) in as_pairs(given, "Adaptive.bounds"))
 
 
 class Adaptive(AbstractObserver):

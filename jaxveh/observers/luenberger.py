@@ -12,8 +12,11 @@ from jaxveh.observers.base import AbstractObserver, advance, check_gain, check_o
 
 
 def array(value: Any) -> jax.Array:
-    """A float array (not weakly typed) from numbers or from an array."""
-    return float_array(value if eqx.is_array(value) else np.asarray(value, float))
+    """A float array (not weakly typed) from numbers or from an array; what is none is left to the check that knows its name."""
+    try:
+        return float_array(value if eqx.is_array(value) else np.asarray(value, float))
+    except (TypeError, ValueError):
+        return value
 
 
 class AbstractMemoryless(AbstractObserver):

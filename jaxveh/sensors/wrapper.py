@@ -8,8 +8,8 @@ from typing import Any
 import equinox as eqx
 import jax
 
-from jaxveh._core.errors import InputError, word_for
-from jaxveh._core.names import check_names
+from jaxveh._core.errors import InputError
+from jaxveh._core.names import as_pairs, check_names
 from jaxveh.sensors.device import AbstractDevice, name_of
 from jaxveh.sensors.randomness import subkey
 
@@ -61,7 +61,9 @@ class Renamed(AbstractDeviceWrapper):
     """
 
     device: AbstractDevice
-    names: tuple[tuple[str, str], ...] = eqx.field(static=True, converter=lambda names: _as_pairs(names))
+    names: tuple[tuple[str, str], ...] = eqx.field(
+        static=True, converter=lambda names: as_pairs(names, "Renamed.names")
+    )
 
     def __check_init__(self):
         check_device(self)
@@ -85,14 +87,6 @@ class Renamed(AbstractDeviceWrapper):
         """The samples of the inner device, under the new names."""
         said = self.device.say(times, outputs, key)
         return {dict(self.names).get(name, name): value for name, value in said.items()}
-
-
-def _as_pairs(names: Any) -> tuple[tuple[str, str], ...]:
-    """A mapping, or pairs, as a static tuple of pairs."""
-    try:
-        return tuple(dict(names).items())
-    except (TypeError, ValueError):
-        raise InputError(f"Renamed.names = {word_for(names)}: must be a mapping from old names to new ones.") from None
 
 
 def check_device(wrapper: AbstractDeviceWrapper) -> None:

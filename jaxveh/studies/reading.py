@@ -89,7 +89,9 @@ def read_study(path: str | os.PathLike) -> Study:
     """
     path = Path(path)
     try:
-        study = study_of(kit.read_toml(path), path.parent)
+        told = kit.read_toml(path)
+        kit.check_file(path, told, "study", (*WHOLE, *DEFAULTS))
+        study = study_of(told, path.parent)
         study.check()
     except InputError as error:
         raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None

@@ -74,6 +74,7 @@ def read_parameters(path: str | Path) -> AbstractTyre:
     """
     path = Path(path)
     content = kit.read_toml(path)
+    kit.check_file(path, content, "tyre", ("tyre",))
     if "tyre" not in content:
         raise InputError(f"{path}: has no table [tyre]; it needs one with `model = ...` and the parameters.")
     kit.check_keys(str(path), content, ("tyre",))

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import check_names, record, record_type
+from jaxveh._core.parts import check_parts
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.base import AbstractVehicle, with_batch_shape
 from jaxveh.vehicles.limits import AccelerationLimits, SteerLimits
@@ -37,6 +38,7 @@ class Commanded(AbstractVehicle):
     acceleration_limits: AccelerationLimits | None = None
 
     def __check_init__(self):
+        check_parts(self)
         inputs = self.vehicle.inputs
         if not set(OWN) <= set(inputs) <= set(KNOWN):
             raise InputError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import check_names, record, record_type
+from jaxveh._core.parts import check_parts
 from jaxveh.roads import LEVEL, AbstractRoad, Ground, under
 from jaxveh.vehicles.base import AbstractVehicle, Motion, with_batch_shape
 
@@ -29,6 +30,7 @@ class Travelling(AbstractVehicle):
     def __check_init__(self):
         if not (self.road is None or isinstance(self.road, AbstractRoad)):
             raise InputError(f"Travelling.road = {type(self.road).__name__}: must be a road of jaxveh.roads, or None.")
+        check_parts(self)
 
     @property
     def inputs(self):

@@ -1,10 +1,13 @@
 """Each mistake is one line that says what, which value, what is allowed; exit code 2, nothing half written."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 from programs import CAR, columns, error_line, run, write_car, write_log
+
+from jaxveh import InputError, estimators, io, studies, tyres
 
 
 def estimate(folder, *more, log=None, car=None):
@@ -175,3 +178,34 @@ def test_numbers_that_are_not_finite_become_null(tmp_path):
     assert content["manifest"]["seed"] == 4
     assert content["manifest"]["configuration"] == {"log": str(tmp_path)}
     assert set(content["manifest"]["versions"]) == {"jaxveh", "jax", "numpy", "python"}
+
+
+KINDS = {
+    "car": (CAR, io.read_car),
+    "calibration": ('estimator = "sideslip"\n[parameters]\n', estimators.read_calibration),
+    "study": (studies.STUDY_SCHEMA, studies.read_study),
+    "channel map": (io.kit.CHANNEL_MAP_SCHEMA, io.read_channel_map),
+    "tyre": ('[tyre]\nmodel = "fiala"\n', tyres.read_parameters),
+    "road": ("friction = 0.8\n", io.read_road),
+}
+"""A file of each kind, and what reads such files."""
+
+
+@pytest.mark.parametrize("given", KINDS)
+@pytest.mark.parametrize("wanted", KINDS)
+def test_a_file_of_another_kind_is_told_by_its_name(wanted, given, tmp_path):
+    """A calibration in the place of a car's file: 'no key estimator' told of the file's contents alone."""
+    assert set(KINDS) == set(io.kit.FILES)
+    path = tmp_path / "some.toml"
+    path.write_text(KINDS[given][0])
+    if wanted != given:
+        words = re.escape(f"some.toml: is {io.kit.FILES[given][1]}; a {wanted} file is needed here.")
+        with pytest.raises(InputError, match=words):
+            KINDS[wanted][1](path)
+
+
+def test_one_file_by_two_names_is_not_two_products(tmp_path):
+    (tmp_path / "sub").mkdir()
+    given = ("fit", write_log(tmp_path), "--vehicle", write_car(tmp_path), "-o", tmp_path / "out.toml")
+    line = refused(tmp_path, run(*given, "--car-file", tmp_path / "sub" / ".." / "out.toml"))
+    assert "--car-file" in line and "is the file of the calibration, -o" in line

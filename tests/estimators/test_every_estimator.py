@@ -356,12 +356,13 @@ def test_what_a_calibration_started_from_is_kept_options_included(name, tmp_path
         np.testing.assert_array_equal(a, b)
     assert (kept.told, kept.weight, kept.validation) == (made.told, made.weight, made.validation)
     assert jax.tree.structure(kept.model) == jax.tree.structure(made.model)
-    bad = dataclasses.replace(made, fit=dataclasses.replace(fit, covariance=spread - 2.0))
-    estimators.write_calibration(bad, path, overwrite=True)
-    with pytest.raises(
-        InputError, match=r"calibration.toml: \[covariance\]: is not positive definite: edited, or lost in"
-    ):
-        estimators.read_calibration(path)
+    for wrong in (spread - 2.0, spread.at[-1, 0].set(jnp.nan), spread.at[-1, -1].set(jnp.inf)):
+        bad = dataclasses.replace(made, fit=dataclasses.replace(fit, covariance=wrong))
+        estimators.write_calibration(bad, path, overwrite=True)
+        with pytest.raises(
+            InputError, match=r"calibration.toml: \[covariance\]: is not positive definite: edited, or lost in"
+        ):
+            estimators.read_calibration(path)
     for p, value in zip(chosen, values, strict=True):
         for wrong in (np.nan, -3.0 * value - 1.0, 1e9):
             one_wrong = Parameters({**by_name, p.name: jnp.asarray(wrong)})

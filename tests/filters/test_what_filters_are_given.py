@@ -2,6 +2,7 @@
 
 import inspect
 
+import families
 import pytest
 from test_every_filter import FILTERS, linear, recordings
 
@@ -59,3 +60,46 @@ def test_one_name_to_keep_is_one_name(keep):
         assert (getattr(kept, name) is None) == (getattr(same, name) is None)
     with pytest.raises(InputError, match=r"keep = 'means': must be one of 'mean', "):
         run(filters.Cubature(), model, recording, keep="means")
+
+
+BY_THE_MODEL = (
+    "names",
+    "linear",
+    "groups",
+    "bins",
+    "extra",
+    "most",
+    "delays",
+    "scales",
+    "variants",
+    "characteristic",
+    "points",
+)
+"""Names of states and channels, which a model has or has not, and functions of it: looked at where there is one."""
+
+
+def test_what_is_wrong_for_an_argument_is_named():
+    """Of every filter, wrapper, look-ahead and form: one of each class."""
+    seen = set()
+    for line in FILTERS.values():
+        families.refuses_everywhere(line.make(), seen, BY_THE_MODEL)
+    assert {"Unscented", "Huber", "InteractingModels"} <= {kind.__name__ for kind in seen}
+
+
+MAPPINGS = {
+    "extra": lambda wrong: filters.ShrinkingProcess(filters.Extended(), wrong),
+    "most": lambda wrong: filters.MatchedProcess(filters.Extended(), wrong),
+    "delays": lambda wrong: filters.Delayed(filters.Extended(), wrong),
+    "scales": lambda wrong: filters.HInfinity(filters.Extended(), 1.0, wrong),
+    "bins": lambda wrong: filters.AdaptiveNumber(filters.ParticleFilter(100), wrong),
+    "widen": lambda wrong: filters.Paused(filters.Extended(), "still", wrong),
+    "variants": lambda wrong: filters.InteractingModels(filters.Extended(), wrong, [[0.9, 0.1], [0.1, 0.9]]),
+    "groups": lambda wrong: filters.Federated(filters.Extended(), wrong),
+}
+
+
+@pytest.mark.parametrize("name", MAPPINGS)
+@pytest.mark.parametrize("wrong", ["eight", object(), 8.0, float])
+def test_what_is_given_by_name_is_a_mapping_or_several(name, wrong):
+    with pytest.raises(InputError, match=name):
+        MAPPINGS[name](wrong)

@@ -7,6 +7,7 @@ import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple
 
+import families
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -307,3 +308,11 @@ def test_fading_lowers_the_friction_and_needs_a_speed():
     assert 1 - 0.01 * 20 * np.tan(0.5) < share < 0.92
     with pytest.raises(InputError, match="contact.speed = None"):
         fading.forces(Contact(slip_angle=0.1, load=LOAD))
+
+
+def test_what_is_wrong_for_an_argument_is_named():
+    """Of every law, and of the coefficients in it: one of each class."""
+    seen = set()
+    for line in LAWS.values():
+        families.refuses_everywhere(line.law if hasattr(line, "law") else line.make(), seen)
+    assert {"MagicFormula", "MFTyre", "TMeasy", "Scaling"} <= {kind.__name__ for kind in seen}

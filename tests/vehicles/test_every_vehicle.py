@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
+import families
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -567,3 +568,11 @@ def test_every_car_with_axles_has_a_linear_single_track_and_an_open_loop():
         np.testing.assert_allclose(found["yaw_rate"][-1], steer * plain.yaw_rate_gain(SPEED), rtol=1e-3, err_msg=name)
         sideslip = steer * plain.sideslip_gain(SPEED)
         np.testing.assert_allclose(found["sideslip"][-1], sideslip, rtol=1e-2, atol=2e-6, err_msg=name)
+
+
+def test_what_is_wrong_for_an_argument_is_named():
+    """Of every car, and of the tyres, drives and steerings in them: one of each class."""
+    seen = set()
+    for line in CARS.values():
+        families.refuses_everywhere(line.make(), seen)
+    assert {"SingleTrack", "FourteenDOF", "Travelling", "Commanded"} <= {kind.__name__ for kind in seen}

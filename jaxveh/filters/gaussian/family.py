@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import equinox as eqx
 
+from jaxveh._core.errors import InputError, word_for
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_covariances
 from jaxveh.filters.gaussian.forms import AbstractForm, Covariance
 from jaxveh.filters.gaussian.linear import check_linear
@@ -105,6 +106,12 @@ class SigmaPointFilter(AbstractRuleFilter):
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
     points: Callable[[int], sigma_points.SigmaPoints] = eqx.field(static=True)
     form: AbstractForm = Covariance()
+
+    def __check_init__(self):
+        if not callable(self.points):
+            raise InputError(
+                f"SigmaPointFilter.points = {word_for(self.points)}: must be a function of the number of states."
+            )
 
     def rule(self, n):
         return Points(self.points(n))

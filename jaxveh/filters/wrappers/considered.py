@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh._core.names import as_groups, as_names, check_names
+from jaxveh._core.names import as_groups, as_names, as_several, check_names
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.wrapper import AbstractStateless
@@ -35,7 +35,7 @@ class Consider(AbstractStateless):
         check_kind("Consider", self.inner, AbstractRuleFilter)
 
     def check(self, model):
-        check_names("Consider.names", self.names, model.states)
+        check_names("Consider.names", as_several(self.names, "Consider.names"), model.states)
         self.inner.check(model)
 
     def update(self, model, belief, row):

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
-from jaxveh._core.names import as_groups, check_names, record
+from jaxveh._core.names import as_groups, as_several, check_names, record
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
@@ -29,6 +29,10 @@ class FederatedBelief(AbstractTransparentBelief):
     locals: tuple[GaussianBelief, ...]
     shares: jax.Array
     alarm: jax.Array
+
+
+def _as_shares(values) -> Any:
+    return None if values is None else as_several(values, "Federated.shares")
 
 
 class Federated(AbstractWrapper):
@@ -65,7 +69,7 @@ class Federated(AbstractWrapper):
     rows_between: ClassVar[bool] = True
     inner: AbstractRuleFilter
     groups: tuple[tuple[str, ...], ...] = eqx.field(static=True, converter=as_groups)
-    shares: tuple[float, ...] | None = eqx.field(static=True, default=None)
+    shares: tuple[float, ...] | None = eqx.field(static=True, default=None, converter=_as_shares)
     by_trace: bool = eqx.field(static=True, default=False)
     reset: bool = eqx.field(static=True, default=True)
     common: bool = eqx.field(static=True, default=False)
@@ -79,9 +83,9 @@ class Federated(AbstractWrapper):
 
     def __check_init__(self):
         check_kind("Federated", self.inner, AbstractRuleFilter)
-        if len(self.groups) < 2:
+        if self.groups is None or len(self.groups) < 2:
             raise InputError(
-                f"Federated.groups has {len(self.groups)} member(s): must be at least two tuples of channels."
+                f"Federated.groups has {len(self.groups or ())} member(s): must be at least two tuples of channels."
             )
         names = [name for group in self.groups for name in group]
         twice = sorted({name for name in names if names.count(name) > 1})
@@ -95,6 +99,7 @@ class Federated(AbstractWrapper):
                 raise InputError(
                     f"Federated.shares has {len(self.shares)} member(s): must be {len(self.groups)}, one for each group."
                 )
+            check("Federated.shares", self.shares, lambda _: True, "positive, with the sum 1")
             fine = abs(sum(self.shares) - 1) < 1e-9 and min(self.shares) > 0
             check("Federated.shares", self.shares, lambda _: fine, "positive, with the sum 1")
         if self.common and (not self.reset or self.shares is not None or self.by_trace):

@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import check, float_array
-from jaxveh._core.names import check_names
+from jaxveh._core.names import as_pairs, check_names
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.wrapper import AbstractStateless
@@ -29,7 +29,7 @@ class HInfinity(AbstractStateless):
 
     inner: AbstractRuleFilter
     bound: jax.Array = eqx.field(converter=lambda v: float_array(v if eqx.is_array(v) else np.asarray(v)))
-    scales: tuple[tuple[str, float], ...] = eqx.field(static=True, converter=lambda v: tuple(dict(v).items()))
+    scales: tuple[tuple[str, float], ...] = eqx.field(static=True, converter=lambda v: as_pairs(v, "HInfinity.scales"))
 
     def __check_init__(self):
         check_kind("HInfinity", self.inner, AbstractRuleFilter)

@@ -12,6 +12,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, float_array
+from jaxveh._core.names import as_several
 from jaxveh._core.result import first_failure
 from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.belief import GaussianBelief
@@ -96,7 +97,7 @@ class InteractingModels(AbstractWrapper):
 
     def __check_init__(self):
         check_kind("InteractingModels", self.inner, AbstractRuleFilter)
-        r = len(self.variants)
+        r = len(as_several(self.variants, "InteractingModels.variants"))
         if r < 2:
             raise InputError(f"InteractingModels.variants has {r} member(s): must be at least two.")
         for name, value, shape in (("transition", self.transition, (r, r)), ("start", self.start, (r,))):

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import check_positive
-from jaxveh._core.names import check_names
+from jaxveh._core.names import as_pairs, check_names
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.outer_belief import either
@@ -42,7 +42,7 @@ class Paused(AbstractWrapper):
         return Gradient.exact
 
     def __init__(self, inner: AbstractGaussianFilter, channel: str, widen: Mapping[str, float]):
-        self.inner, self.channel, self.widen = inner, channel, tuple(sorted(dict(widen).items()))
+        self.inner, self.channel, self.widen = inner, channel, tuple(sorted(as_pairs(widen, "Paused.widen")))
 
     def __check_init__(self):
         check_kind("Paused", self.inner, AbstractGaussianFilter)

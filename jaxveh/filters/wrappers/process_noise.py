@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, check_positive
-from jaxveh._core.names import check_names
+from jaxveh._core.names import as_pairs, check_names
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.filters.gaussian.noises import covariance_in
 from jaxveh.filters.wrappers.base import AbstractRemembering, Remembering
@@ -38,7 +38,7 @@ class ShrinkingProcess(AbstractRemembering):
     extra: tuple[tuple[str, float], ...] = eqx.field(static=True)
 
     def __init__(self, inner: AbstractGaussianFilter, extra: Mapping[str, float]):
-        self.inner, self.extra = inner, tuple(sorted(dict(extra).items()))
+        self.inner, self.extra = inner, tuple(sorted(as_pairs(extra, "ShrinkingProcess.extra")))
 
     def __check_init__(self):
         _check_levels("ShrinkingProcess.extra", self.extra)
@@ -79,7 +79,7 @@ class MatchedProcess(AbstractRemembering):
     forgetting: float = eqx.field(static=True)
 
     def __init__(self, inner: AbstractGaussianFilter, most: Mapping[str, float], forgetting: float = 0.95):
-        self.inner, self.most, self.forgetting = inner, tuple(sorted(dict(most).items())), forgetting
+        self.inner, self.most, self.forgetting = inner, tuple(sorted(as_pairs(most, "MatchedProcess.most"))), forgetting
 
     def __check_init__(self):
         _check_levels("MatchedProcess.most", self.most)
