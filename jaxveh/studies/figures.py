@@ -146,7 +146,8 @@ def rank_bars(found: Swept, name: str, axis: Axis) -> Any:
             shade = 0.85 * place / max(1, len(order) - 1)
             ax.barh(range(len(order)), shares, left=left, color=str(0.1 + shade), label=f"{place + 1}.")
             left += shares
-        names = [f"{one.labels[i]} ({one.mean[i]:.2f})" for i in order]
+        means = ["-" if np.isnan(mean) else f"{mean:.2f}" for mean in one.mean]
+        names = [f"{one.labels[i]} ({means[i]})" for i in order]
         ax.set(yticks=range(len(order)), yticklabels=names, xlabel="share of runs [%]", xlim=(0, 100))
         ax.set_title(f"ranks by {name}, mean in brackets", fontweight="normal")
         figure.legend(loc="outside lower center", ncols=min(len(order), 10), title="place")

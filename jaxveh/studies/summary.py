@@ -57,10 +57,27 @@ def baseline_of(found: Swept, name: str) -> str | None:
 
 def at_front(found: Swept, name: str, axes: Iterable[Axis]) -> np.ndarray:
     """A value's numbers (in the shown unit) with these axes in front and everything else in one last axis: (axes..., runs)."""
+    return _in_front(found, np.asarray(found[name], float) * display_of(found, name).factor, axes)
+
+
+def _in_front(found: Swept, values: np.ndarray, axes: Iterable[Axis]) -> np.ndarray:
     order = [found.design.axes.index(axis) for axis in axes]
-    values = np.asarray(found[name], float) * display_of(found, name).factor
     front = np.moveaxis(values, order, range(len(order)))
     return front.reshape(*front.shape[: len(order)], -1)
+
+
+def computed(found: Swept) -> np.ndarray:
+    """Which runs are computed. A store that is half done has NaN in the others, which have not lost: a choice of which nothing is
+    computed yet would be the worst of all.
+
+    A study says of each run whether it `failed`. Of other sweeps a seed counts as computed for a choice if some number of its
+    runs is known, since a run that is lost may have none.
+    """
+    if "failed" in found.values:
+        return ~np.isnan(np.asarray(found["failed"], float))
+    known = np.logical_or.reduce([~np.isnan(np.asarray(found[name], float)) for name in plain_values(found)])
+    points = tuple(i for i, axis in enumerate(found.design.axes) if axis not in found.design.choices)
+    return np.broadcast_to(known.any(axis=points, keepdims=True), known.shape)
 
 
 def quartiles(values: np.ndarray) -> np.ndarray:
@@ -79,8 +96,14 @@ class Ranks(NamedTuple):
 
 
 def ranks(found: Swept, name: str, axis: Axis) -> Ranks:
-    """The ranks of the labels of an axis by an error on the same runs; a run that is not finite comes last."""
-    values = at_front(found, name, [axis])
+    """The ranks of the labels of an axis by an error on the same runs; a run that is not finite comes last.
+
+    Runs that are not computed for each label do not count; if there are no others, the ranks are NaN.
+    """
+    there = _in_front(found, computed(found), [axis]).all(axis=0)
+    values = at_front(found, name, [axis])[:, there]
+    if not there.any():
+        return Ranks(tuple(map(str, axis.labels)), np.full(len(values), np.nan), np.zeros((len(values), len(values))))
     values = np.where(np.isfinite(values), values, np.inf)
     count = len(values)
     below = np.stack([(values < one).sum(axis=0) for one in values])

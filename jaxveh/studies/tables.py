@@ -8,7 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh.studies.summary import at_front, baseline_of, display_of, errors_of, label, plain_values, quartiles, ranks
+from jaxveh.studies.summary import (
+    at_front,
+    baseline_of,
+    computed,
+    display_of,
+    errors_of,
+    label,
+    plain_values,
+    quartiles,
+    ranks,
+)
 from jaxveh.sweeps import Axis, Comparison, Swept, Table, compare
 
 MOST_POINTS = 40
@@ -68,9 +78,9 @@ def _against_nothing(found: Swept, errors: list[str]) -> Table:
     for name in errors:
         nothing = baseline_of(found, name)
         if nothing is not None and found.seeds > 1:
-            rows.append(
-                (name, *_comparison(*_computed(np.asarray(found[name], float), np.asarray(found[nothing], float))))
-            )
+            whole = _whole(computed(found))
+            one, other = (np.asarray(found[value], float)[..., whole] for value in (name, nothing))
+            rows.append((name, *_comparison(one, other)))
     return Table("Against doing nothing (baseline), on the same drives", ("error", *COMPARED), rows)
 
 
@@ -82,9 +92,10 @@ def _pairs(found: Swept, errors: list[str], axis: Axis) -> Table:
     rows = []
     place = found.design.axes.index(axis)
     for name in errors if found.seeds > 1 else ():
-        values = np.moveaxis(np.asarray(found[name], float), place, 0)
+        values, there = (np.moveaxis(all_of, place, 0) for all_of in (np.asarray(found[name], float), computed(found)))
         for i in range(1, len(axis.labels)):
-            rows.append((name, str(axis.labels[i]), *_comparison(values[i], values[0])))
+            whole = _whole(there[i] & there[0])
+            rows.append((name, str(axis.labels[i]), *_comparison(values[i][..., whole], values[0][..., whole])))
     title = f"{axis.name} against {axis.labels[0]}, on the same drives (a seed counts with its geometric mean over all points)"
     return Table(title, ("error", axis.name, *COMPARED), rows, 2)
 
@@ -94,14 +105,16 @@ def _ranks(found: Swept, errors: list[str], axis: Axis) -> Table:
     for name in errors:
         one = ranks(found, name, axis)
         for i, who in enumerate(one.labels):
-            rows.append((name, who, float(one.mean[i]), f"{100 * one.shares[i, 0]:.1f} %"))
+            known = np.isfinite(one.mean[i])
+            rows.append(
+                (name, who, *((float(one.mean[i]), f"{100 * one.shares[i, 0]:.1f} %") if known else ("-", "-")))
+            )
     return Table(f"Ranks of {axis.name} on the same drives", ("error", axis.name, "mean rank", "best in"), rows, 2)
 
 
-def _computed(values: np.ndarray, nothing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The seeds of which something is known: doing nothing never fails, so runs without its error are not computed yet."""
-    there = np.isfinite(nothing).reshape(-1, nothing.shape[-1]).any(axis=0)
-    return values[..., there], nothing[..., there]
+def _whole(there: np.ndarray) -> np.ndarray:
+    """The seeds of which every point is computed: a seed counts with its geometric mean over all points."""
+    return there.reshape(-1, there.shape[-1]).all(axis=0)
 
 
 def _comparison(a: np.ndarray, b: np.ndarray) -> tuple[Any, ...]:

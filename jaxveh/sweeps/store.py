@@ -46,7 +46,8 @@ class Store:
         zarr = kit.require("zarr", "storing a sweep", "sweep")
         self.path = Path(path)
         if not (self.path / "zarr.json").exists():
-            raise InputError(f"{self.path}: no such store: there is no zarr.json.")
+            there = " Take another name: the folder is of something else." if self.path.exists() else ""
+            raise InputError(f"{self.path}: no such store: there is no zarr.json.{there}")
         with self._told_if_damaged("zarr.json"):
             self.group = zarr.open_group(self.path, mode="r+")
             told = self.group.attrs.get(MANIFEST)

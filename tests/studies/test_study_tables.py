@@ -71,6 +71,30 @@ def test_seeds_that_are_not_computed_yet_are_no_ties(done):
         assert all(row[2:] == ("-", "-", "-") for row in told["filter"])
 
 
+@pytest.mark.parametrize("study", [True, False])
+@pytest.mark.parametrize("late", ["B", "C", "all"])
+def test_a_choice_that_is_not_computed_yet_has_neither_lost_nor_tied(late, study):
+    """Choices are computed one after the other: a killed sweep has none of the later ones, and said that they are the worst."""
+    whole = swept()
+    names = {"rmse.sideslip", "baseline.sideslip"}
+    values = {name: np.array(whole[name], float) for name in names}
+    if study:
+        values["failed"] = np.isnan(values["rmse.sideslip"]).astype(float)
+    of_late = slice(None) if late == "all" else [whole.design.axis("filter").labels.index(late)]
+    for one in values.values():
+        one[:, :, of_late] = np.nan
+    found = sweeps.Swept(whole.design, 5, values, UNITS, "a note")
+    told = {t.title.partition(" ")[0]: t.rows for t in studies.tables(found)}
+    assert all(row[2:] == ("-", "-") for row in told["Ranks"])
+    rows = {row[1]: row[2:] for row in told["filter"]}
+    first = {t.title.partition(" ")[0]: t.rows for t in studies.tables(whole)}
+    for label, row in rows.items():
+        known = {r[1]: r[2:] for r in first["filter"]}[label]
+        assert row == (("-", "-", "-") if late in (label, "all") else known)
+    one = summary.ranks(found, "rmse.sideslip", whole.design.axis("filter"))
+    assert np.isnan(one.mean).all() and studies.figures.rank_bars(found, "rmse.sideslip", whole.design.axis("filter"))
+
+
 def test_pairs_count_runs_and_weigh_seeds():
     found = swept()
     one = next(t for t in studies.tables(found) if t.title.startswith("filter against A"))
