@@ -57,14 +57,9 @@ def as_mapping(values, what: str = "values") -> dict:
 
 
 def as_names(values, what: str = "names") -> Any:
-    """Return names as a tuple, which a static field must be; a single string is one name, not its letters. None stays None.
-
-    Raises `InputError` for what is no name, nor several.
-    """
-    if values is None:
-        return None
-    if isinstance(values, str):
-        return (values,)
+    """Return names as a tuple, which a static field must be; a single string is one name, not its letters. None stays None."""
+    if values is None or isinstance(values, str):
+        return None if values is None else (values,)
     try:
         return tuple(values)
     except TypeError:

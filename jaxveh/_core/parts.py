@@ -43,7 +43,9 @@ def _kinds_of_parts(kind: type) -> dict[str, tuple[type, ...]]:
     except (NameError, TypeError):
         # A class made within a function, or one that another library checks.
         return {}
-    named = {f.name: typing.get_args(hints.get(f.name)) or (hints.get(f.name),) for f in dataclasses.fields(kind)}
+    named: dict[str, tuple[Any, ...]] = {
+        f.name: typing.get_args(hints.get(f.name)) or (hints.get(f.name),) for f in dataclasses.fields(kind)
+    }
     return {name: kinds for name, kinds in named.items() if all(map(_is_part, kinds)) and kinds != (type(None),)}
 
 

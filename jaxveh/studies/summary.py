@@ -66,7 +66,7 @@ def _in_front(found: Swept, values: np.ndarray, axes: Iterable[Axis]) -> np.ndar
     return front.reshape(*front.shape[: len(order)], -1)
 
 
-def computed(found: Swept) -> np.ndarray:
+def computed_runs(found: Swept) -> np.ndarray:
     """Which runs are computed. A store that is half done has NaN in the others, which have not lost: a choice of which nothing is
     computed yet would be the worst of all.
 
@@ -100,7 +100,7 @@ def ranks(found: Swept, name: str, axis: Axis) -> Ranks:
 
     Runs that are not computed for each label do not count; if there are no others, the ranks are NaN.
     """
-    there = _in_front(found, computed(found), [axis]).all(axis=0)
+    there = _in_front(found, computed_runs(found), [axis]).all(axis=0)
     values = at_front(found, name, [axis])[:, there]
     if not there.any():
         return Ranks(tuple(map(str, axis.labels)), np.full(len(values), np.nan), np.zeros((len(values), len(values))))

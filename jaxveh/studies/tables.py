@@ -11,7 +11,7 @@ import numpy as np
 from jaxveh.studies.summary import (
     at_front,
     baseline_of,
-    computed,
+    computed_runs,
     display_of,
     errors_of,
     label,
@@ -78,7 +78,7 @@ def _against_nothing(found: Swept, errors: list[str]) -> Table:
     for name in errors:
         nothing = baseline_of(found, name)
         if nothing is not None and found.seeds > 1:
-            whole = _whole(computed(found))
+            whole = _whole(computed_runs(found))
             one, other = (np.asarray(found[value], float)[..., whole] for value in (name, nothing))
             rows.append((name, *_comparison(one, other)))
     return Table("Against doing nothing (baseline), on the same drives", ("error", *COMPARED), rows)
@@ -92,7 +92,9 @@ def _pairs(found: Swept, errors: list[str], axis: Axis) -> Table:
     rows = []
     place = found.design.axes.index(axis)
     for name in errors if found.seeds > 1 else ():
-        values, there = (np.moveaxis(all_of, place, 0) for all_of in (np.asarray(found[name], float), computed(found)))
+        values, there = (
+            np.moveaxis(all_of, place, 0) for all_of in (np.asarray(found[name], float), computed_runs(found))
+        )
         for i in range(1, len(axis.labels)):
             whole = _whole(there[i] & there[0])
             rows.append((name, str(axis.labels[i]), *_comparison(values[i][..., whole], values[0][..., whole])))
@@ -114,7 +116,7 @@ def _ranks(found: Swept, errors: list[str], axis: Axis) -> Table:
 
 def _whole(there: np.ndarray) -> np.ndarray:
     """The seeds of which every point is computed: a seed counts with its geometric mean over all points."""
-    return there.reshape(-1, there.shape[-1]).all(axis=0)
+    return np.all(there.reshape(-1, there.shape[-1]), axis=0)
 
 
 def _comparison(a: np.ndarray, b: np.ndarray) -> tuple[Any, ...]:

@@ -78,8 +78,7 @@ def read_parameters(path: str | Path) -> AbstractTyre:
     if "tyre" not in content:
         raise InputError(f"{path}: has no table [tyre]; it needs one with `model = ...` and the parameters.")
     kit.check_keys(str(path), content, ("tyre",))
-    table = content["tyre"]
-    where = f"{path}: [tyre]"
+    table, where = content["tyre"], f"{path}: [tyre]"
     if not isinstance(table, dict) or "model" not in table:
         raise InputError(f"{where}: has no `model`; it must be one of {', '.join(MODELS)}.")
     name = kit.toml_text(f"{where} model", table["model"])

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import sweeps
+from jaxveh import manoeuvres, sweeps
 from jaxveh._core.names import record_type
 from jaxveh.experiments import federated_ckf as experiment
 from jaxveh.experiments.federated_ckf import drives, model, road_drives, road_filters, road_tables, study
@@ -127,8 +127,7 @@ def test_the_table_of_the_speeds_has_both_and_what_doing_nothing_gives():
 
 def test_the_driver_in_the_lane_comes_back_to_its_middle():
     """His offset follows y'' + 2 D w y' + w^2 y = 0 of a car that turns as its front wheels say."""
-    speed = type("Steady", (), {"at": staticmethod(lambda t: (5.0, 0.0))})
-    driver = road_drives.lane_slalom(dataclasses.replace(SMALL, steer=0.0), speed, 0.0)
+    driver = road_drives.lane_slalom(dataclasses.replace(SMALL, steer=0.0), manoeuvres.SteadySpeed(5.0), 0.0)
     turning = SMALL.speed / 2.6
     np.testing.assert_allclose(float(driver.per_offset) * turning * SMALL.speed, road_drives.LANE_RATE**2, rtol=1e-9)
     middle = 2.0 * road_drives.LANE_DAMPING * road_drives.LANE_RATE

@@ -100,9 +100,10 @@ class InteractingModels(AbstractWrapper):
         r = len(as_several(self.variants, "InteractingModels.variants"))
         if r < 2:
             raise InputError(f"InteractingModels.variants has {r} member(s): must be at least two.")
-        for name, value, shape in (("transition", self.transition, (r, r)), ("start", self.start, (r,))):
-            if value is None and name == "start":
-                continue
+        given: dict[str, tuple[Any, tuple[int, ...]]] = {"transition": (self.transition, (r, r))}
+        if self.start is not None:
+            given["start"] = self.start, (r,)
+        for name, (value, shape) in given.items():
             if np.shape(value) != shape:
                 raise InputError(
                     f"InteractingModels.{name} has shape {np.shape(value)}: must be {shape} for {r} variants."
