@@ -55,7 +55,6 @@ class GNSS(AbstractInstrument):
     climb: Signal | None = None
 
     def __check_init__(self):
-        check_parameters(self)
         check_spans("GNSS.outages", self.outages)
         if (self.outage_rate is None) != (self.outage_length is None):
             raise InputError(
@@ -69,6 +68,7 @@ class GNSS(AbstractInstrument):
             raise InputError(f"GNSS.climb = {self.climb!r}: must be a Signal with the errors in m/s, or None.")
         if not isinstance(self.antenna, Position):
             raise InputError(f"GNSS.antenna = {self.antenna!r}: must be a Position.")
+        check_parameters(self)
 
     @property
     def channels(self) -> tuple[str, ...]:

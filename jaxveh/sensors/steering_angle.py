@@ -35,9 +35,9 @@ class SteeringAngle(AbstractInstrument):
 
     def __check_init__(self):
         check_one_of("SteeringAngle.channel", self.channel, ("steer", "steering_wheel"))
-        check_parameters(self)
         if not isinstance(self.signal, Signal):
             raise InputError(f"SteeringAngle.signal = {self.signal!r}: must be a Signal(noise=..., bias=...).")
+        check_parameters(self)
         if self.ratio is not None and self.channel == "steer":
             raise InputError(f"SteeringAngle.ratio = {self.ratio}: only the channel steering_wheel has one.")
 
