@@ -163,8 +163,7 @@ def _made(
     """Return what the standard columns say in the names and axes of the package: from which columns, values, unit."""
     number = lambda name: numeric(cells[standard[name]], f"{path}: column {standard[name]!r}").astype(np.float64)
     in_si = lambda name, unit: convert(number(name), units[standard[name]], unit, f"{path}: column {standard[name]!r}")
-    count = number("sats") if "sats" in standard else None
-    fixed = True if count is None else (np.nan_to_num(count).astype(int) & SATELLITES) > 0
+    fixed = _fixed(path, number("sats")) if "sats" in standard else True
     seen = lambda values: np.where(fixed, values, np.nan)
     made = {}
     for name, ours, unit in (
@@ -182,6 +181,19 @@ def _made(
         east, north = east_and_north(seen(in_si("lat", "rad")), seen(-in_si("long", "rad")))
         made |= {"x": (places, east, "m"), "y": (places, north, "m")}
     return made
+
+
+def _fixed(path: Path, sats: np.ndarray) -> np.ndarray:
+    """Return whether there is a satellite, (n,); where no row has one, the file does not count them, and all rows are taken."""
+    there = (np.nan_to_num(sats).astype(int) & SATELLITES) > 0
+    if there.any():
+        return there
+    warnings.warn(
+        f"{path}: `sats` is 0 in all rows: it is not used, so that rows without a satellite are not found.",
+        JaxvehWarning,
+        stacklevel=4,
+    )
+    return ~there
 
 
 def _unwrapped(angles: np.ndarray) -> np.ndarray:

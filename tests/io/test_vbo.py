@@ -155,6 +155,12 @@ def test_what_is_no_log_of_a_vbox_is_told(case, tmp_path):
         read(tmp_path, text)
 
 
+def test_satellites_that_are_never_counted_are_not_lost(tmp_path):
+    with pytest.warns(JaxvehWarning, match="`sats` is 0 in all rows: it is not used"):
+        found = read(tmp_path, PLAIN.replace("009", "128"))
+    np.testing.assert_allclose(found["speed"], [10.0, 20.0])
+
+
 def test_units_of_other_columns_are_not_guessed(tmp_path):
     """[channel units] has a line for each column that is not standard; a file with more of them does not tell whose they are."""
     odd = PLAIN.replace("[column names]", "[channel units]\nm/s\nNm\nkm/h\n\n[column names]")
