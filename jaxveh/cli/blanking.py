@@ -39,8 +39,7 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
             "--channels (jaxveh schema channels)."
         )
     for name in (*INPUTS, *(("steer",) if "steer" in recording else ())):
-        if max_gap is not None and np.isfinite(np.asarray(recording[name])).any():
-            recording = _with_ends(recording.fill(name, "linear", max_gap), name, max_gap)
+        recording = fill_short(recording, name, max_gap)
         gaps = np.isnan(np.asarray(recording[name]))
         if name in INPUTS and gaps.any():
             first = np.asarray(recording.time)[np.argmax(gaps)]
@@ -52,8 +51,14 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
     return recording
 
 
-def _with_ends(recording: Recording, name: str, reach: float) -> Recording:
-    """The recording with the first and the last sample of a channel also in the rows before and after them, up to `reach`, s."""
+def fill_short(recording: Recording, name: str, reach: float | None) -> Recording:
+    """Fill gaps of a channel of at most `reach` seconds: by linear interpolation, and at the ends by the nearest sample.
+
+    Nothing is filled if `reach` is None, or if the channel has no sample.
+    """
+    if reach is None or not np.isfinite(np.asarray(recording[name])).any():
+        return recording
+    recording = recording.fill(name, "linear", reach)
     time, values = np.asarray(recording.time), np.array(recording[name])
     first, last = np.flatnonzero(np.isfinite(values))[[0, -1]]
     values[(time < time[first]) & (time >= time[first] - reach)] = values[first]

@@ -15,7 +15,7 @@ def with_speed(log: Path, recording: Recording, car: CarSpecification) -> Record
     speed = estimators.speed
     if "v_x" in recording:
         return recording
-    if any(name.startswith("wheel_speed_") for name in recording.names):
+    if has_wheels(recording):
         how = f"as --what speed does ({speed.RECOMMENDED}), and used like a measurement"
         _tell(log, f"it is estimated from the wheel speeds, {how}")
         return recording.replace(v_x=speed.estimate(car, recording)["v_x"], units={"v_x": "m/s"})
@@ -25,6 +25,11 @@ def with_speed(log: Path, recording: Recording, car: CarSpecification) -> Record
         )
         return recording.replace(v_x=recording["speed"], units={"v_x": "m/s"})
     return recording
+
+
+def has_wheels(recording: Recording) -> bool:
+    """Whether a log has wheel speeds."""
+    return any(name.startswith("wheel_speed_") for name in recording.names)
 
 
 def _tell(log: Path, what: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
@@ -12,10 +13,10 @@ import numpy as np
 from jaxveh import InputError, Recording, estimators, io
 from jaxveh._core.errors import check_one_of, check_positive
 from jaxveh._core.recording import TRUTH
-from jaxveh.cli.blanking import with_fill_option
+from jaxveh.cli.blanking import fill_short, with_fill_option
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.drives import read_log
-from jaxveh.cli.missing_speed import with_speed
+from jaxveh.cli.missing_speed import has_wheels, with_speed
 from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
 from jaxveh.cli.quantity_options import QUANTITIES, USUAL_FILTER, USUAL_PARTICLES
 from jaxveh.cli.vehicle import car_of
@@ -119,13 +120,8 @@ def estimate_quantities(asked: Asked, numbers: Path | None) -> None:
         shown = []
         for k, (log, (seen, recording)) in enumerate(zip(asked.logs, told, strict=True)):
             report(k, len(told), f"estimating along {log.name} (compiling first)")
-            driven = seen if asked.what == (SPEED,) else with_speed(log, seen, car)
-            shown.append(
-                {
-                    name: _one(asked, QUANTITIES[name], car, seen if name == SPEED else driven, recording)
-                    for name in asked.what
-                }
-            )
+            own = _logs(asked, log, seen, car)
+            shown.append({name: _one(asked, QUANTITIES[name], car, own[name], recording) for name in asked.what})
     for log, product, (_, recording), one in zip(asked.logs, products, told, shown, strict=True):
         found[log.name] = _conclude(asked, log, product, recording, one)
     content = found[asked.logs[0].name] if len(asked.logs) == 1 else {"logs": found}
@@ -167,12 +163,29 @@ def _log(asked: Asked, log: Path, car: CarSpecification) -> tuple[Recording, Rec
 
 def _filled(asked: Asked, recording: Recording) -> Recording:
     """Fill gaps in the inputs if `--fill` is given."""
-    if asked.fill is None:
-        return recording
     for name in ("steer", "v_x", "a_x"):
-        if name in recording and np.isfinite(np.asarray(recording[name])).any():
-            recording = recording.fill(name, "linear", asked.fill)
+        if name in recording:
+            recording = fill_short(recording, name, asked.fill)
     return recording
+
+
+def _logs(asked: Asked, log: Path, seen: Recording, car: CarSpecification) -> dict[str, Recording]:
+    """Return the log that each quantity sees: with `v_x` from the wheels, except for the speed itself; from the speed over
+    ground only for methods that do not use that, too, as a measurement of its own."""
+    wanting = {name for name in asked.what if name != SPEED and (has_wheels(seen) or _wants_v_x(asked, name, car))}
+    driven = _filled(asked, with_speed(log, seen, car)) if wanting else seen
+    return {name: driven if name in wanting else seen for name in asked.what}
+
+
+def _wants_v_x(asked: Asked, quantity: str, car: CarSpecification) -> bool:
+    """Whether a chosen method of the quantity uses `v_x`, and not the speed over ground itself."""
+    module = QUANTITIES[quantity]
+    for name in asked.methods or (module.RECOMMENDED,):
+        with contextlib.suppress(InputError):
+            used = {need.channel for need in module.METHODS[name].make(car).needs}
+            if "v_x" in used and "speed" not in used:
+                return True
+    return False
 
 
 def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, seen: Recording, recording: Recording) -> Shown:

@@ -50,9 +50,10 @@ def test_without_wheels_it_is_the_speed_over_ground(capsys):
 WITHOUT = {"wheels": ("v_x", "speed"), "satellites": ("v_x", "wheel_speed")}
 
 
-@pytest.mark.parametrize(
-    ("what", "left"), [("--as-told", "wheels"), ("--as-told", "satellites"), ("--what bank", "wheels")]
-)
+PROGRAMS = [(what, left) for what in ("--as-told", "--what bank") for left in WITHOUT]
+
+
+@pytest.mark.parametrize(("what", "left"), PROGRAMS)
 def test_programs_take_such_a_log(tmp_path, what, left):
     io.write_car(method_logs.CAR, tmp_path / "car.toml")
     columns = {}
@@ -69,3 +70,16 @@ def test_programs_take_such_a_log(tmp_path, what, left):
         columns[name] = frame[column]
     apart = np.sqrt(np.nanmean((columns["with"] - columns["without"]) ** 2))
     assert 0.0 < apart < 0.3 * np.sqrt(np.nanmean(columns["with"] ** 2))
+
+
+@pytest.mark.parametrize("quantity", ["navigation", "grade"])
+def test_what_can_do_without_is_not_told_the_same_speed_twice(tmp_path, quantity):
+    """Both would count as measurements with errors of their own."""
+    io.write_car(method_logs.CAR, tmp_path / "car.toml")
+    io.write_recording(log("v_x", "wheel_speed"), tmp_path / "log.csv")
+    out = tmp_path / "out.csv"
+    methods = () if quantity == "navigation" else ("--methods", "satellite")
+    car = ("--vehicle", tmp_path / "car.toml")
+    result = run("estimate", tmp_path / "log.csv", *car, "-o", out, "--what", quantity, *methods, "--anyway")
+    assert result.exit_code == 0, result.output
+    assert "there is no v_x" not in " ".join(result.stdout.split()) and out.exists()
