@@ -118,6 +118,8 @@ def _parse(unit: str):
         prefix, plain, _ = registry.parse_unit_name(name)[0]
         if prefix and prefix not in _PREFIXED.get(plain, ()):
             raise ValueError(f"{prefix} in front of {plain}")
+    # Raises an error of its own for a power whose factor no number holds.
+    registry.get_root_units(parsed)
     return parsed
 
 

@@ -209,6 +209,16 @@ def test_a_prefix_that_nobody_uses_is_no_unit(prefix):
                     convert(1.0, unit, target, "channel")
 
 
+POWERS = ("{}^400", "{}^-400", "({})^1e3", "{}/e^400", "m/{}^{}".format("{}", "9" * 30))
+
+
+@pytest.mark.parametrize("power", POWERS)
+@pytest.mark.parametrize("unit", ["km", "ms", "mm", "deg", "kN", "km/h"])
+def test_a_power_that_no_number_holds_is_no_unit(unit, power):
+    with pytest.raises(InputError, match=r"is not known|of another quantity"):
+        convert(1.0, power.format(unit), "m/s", "channel")
+
+
 @pytest.mark.parametrize("unit", ["grad", "Grad", "GRAD", "grad/s", "Grad/s", "Grad/sec"])
 def test_gradians_or_degrees_is_asked(unit):
     with pytest.raises(InputError, match=r"channel: unit '.*' may be degrees or gradians. Write `deg`"):
