@@ -74,11 +74,13 @@ def open_vbo(path: Path, channels: ChannelMap | None) -> TableLog:
     units = _units(path, head, standard)
     if (time := standard.get("time")) is not None:
         cells[time] = _of_day(cells[time], f"{path}: column {time!r}")
-    made = {name: one for name, one in _made(path, cells, standard, units).items() if name not in cells}
+    translated = _translated(path, cells, standard, units)
+    made = {name: one for name, one in translated.items() if name not in cells}
     units |= {name: unit for name, (_, _, unit) in made.items()}
     columns = {**cells, **{name: values for name, (_, values, _) in made.items()}}
     log = TableLog(path, list(columns), columns.__getitem__, units, "", channels)
-    replaced = {source for sources, _, _ in made.values() for source in sources}
+    # Also beside a column `course` of the file's own: its `heading` is not that of two antennas.
+    replaced = {source for sources, _, _ in translated.values() for source in sources}
     log.names = tuple(name for name in log.names if name not in replaced)
     return log
 
@@ -157,7 +159,7 @@ def _of_day(cells: Any, what: str) -> Any:
     return after_midnight(np.round(3600.0 * hours + 60.0 * minutes + seconds, 6))
 
 
-def _made(
+def _translated(
     path: Path, cells: dict[str, Any], standard: dict[str, str], units: dict[str, str]
 ) -> dict[str, tuple[Sequence[str], np.ndarray, str]]:
     """Return what the standard columns say in the names and axes of the package: from which columns, values, unit."""

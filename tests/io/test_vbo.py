@@ -132,6 +132,13 @@ def test_a_channel_map_may_name_the_file_s_own_columns_and_ours(tmp_path):
     assert found.unit("v_x") == "m/s"
 
 
+def test_a_heading_is_never_that_of_two_antennas(tmp_path):
+    own = PLAIN.replace("time velocity", "time velocity heading course").replace(".0\n", ".0 090.00 0.5\n")
+    found = read(tmp_path, own)
+    assert found.names == ("sats", "course", "speed")
+    np.testing.assert_allclose(found["course"], 0.5)
+
+
 PLAIN = "[header]\nsatellites\ntime\nvelocity kmh\n\n[column names]\nsats time velocity\n\n[data]\n"
 PLAIN += "009 000001.00 036.0\n009 000002.00 072.0\n"
 
