@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import equinox as eqx
@@ -73,11 +74,33 @@ def check_single(**values) -> None:
             raise InputError(f"{name} has the shape {np.shape(value)}: must be one number.")
 
 
-def check_kind(name: str, value, kind: type, advice: str = "") -> None:
-    """Raise `InputError` unless `value` is of a kind; `advice` says what makes one."""
+def check_kind(name: str, value, kind: Any, advice: str = "") -> None:
+    """Raise `InputError` unless `value` is of a kind, or of one of several (A | B); `advice` says what makes one."""
     if not isinstance(value, kind):
-        shown = kind.__name__.removeprefix("Abstract")
+        shown = " or ".join(one.__name__.removeprefix("Abstract") for one in getattr(kind, "__args__", (kind,)))
         raise InputError(f"{name} = {word_for(value)}: must be of the kind {shown}." + (f" {advice}" if advice else ""))
+
+
+def check_callable(name: str, value, advice: str = "") -> None:
+    """Raise `InputError` unless `value` is a function, or an object that can be called; a class is neither."""
+    if not callable(value) or isinstance(value, type):
+        raise InputError(f"{name} = {word_for(value)}: must be a function." + (f" {advice}" if advice else ""))
+
+
+def check_has(name: str, value, fields: Iterable[str], advice: str = "") -> None:
+    """Raise `InputError` unless `value` is an object with these fields; `advice` says what makes one."""
+    missing = [field for field in fields if isinstance(value, type) or not hasattr(value, field)]
+    if missing:
+        told = f"{name} = {word_for(value)}: has no {', '.join(missing)}."
+        raise InputError(told + (f" {advice}" if advice else ""))
+
+
+def path_of(path) -> Path:
+    """Return a path; raises `InputError` for what is no name of a file or folder."""
+    try:
+        return Path(path)
+    except TypeError:
+        raise InputError(f"path = {word_for(path)}: must be the name of a file or folder.") from None
 
 
 def word_for(value) -> str:

@@ -13,7 +13,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxveh._core.bijectors import AbstractBijector, Positive, Real
-from jaxveh._core.errors import InputError, check_finite, check_positive, did_you_mean, float_array
+from jaxveh._core.errors import InputError, check, check_finite, check_positive, did_you_mean, float_array
 from jaxveh._core.names import check_names
 from jaxveh._core.parts import check_parts
 
@@ -277,6 +277,7 @@ def prior_spread(parameters: tuple[Parameter, ...], values, relative, what: str 
             if share is None:
                 raise InputError(f"{what}: no spread for {p.name}; there are: {', '.join(relative)}.")
         value = jnp.asarray(value)
+        check(f"{what} spread of {p.name}", share, lambda _: True, "a relative standard deviation")
         share = jnp.asarray(share, value.dtype)
         if isinstance(p.domain, Real):
             spread = share * (abs(p.scale) if p.scale is not None else jnp.abs(value))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
+
+from jaxveh._core.errors import check_callable
 
 
 class Progress(Protocol):
@@ -13,6 +15,13 @@ class Progress(Protocol):
 
 def silent(done: float, total: float, stage: str) -> None:
     """The default: report nothing."""
+
+
+def check_progress(report: Any) -> None:
+    """Raise `InputError` unless progress can be reported to it."""
+    check_callable(
+        "progress", report, "It is called with the work done, the total and a stage: lambda done, total, stage: ..."
+    )
 
 
 def part(report: Progress, first: float, last: float, name: str) -> Progress:

@@ -10,7 +10,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_finite
+from jaxveh._core.errors import InputError, check_finite, check_kind, path_of
 from jaxveh._core.parameter import Parameter, put, resolve
 from jaxveh._core.parameters import Parameters
 from jaxveh._core.result import Result, code
@@ -56,6 +56,8 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike, *, over
 
     **Raises** `InputError` where the file exists and `overwrite` is False, or the calibration did not start from a car's file.
     """
+    path = path_of(path)
+    check_kind("calibration", calibration, Calibration, "The `calibrate` of an estimator makes one.")
     told, fit = calibration.told, calibration.fit
     if told is None:
         raise InputError(
@@ -102,7 +104,7 @@ def read_calibration(path: str | os.PathLike) -> Calibration:
     **Raises** `InputError` for a file that is no calibration, is cut short, was written by another version, or holds other
     parameters than the estimator fits.
     """
-    path = Path(path)
+    path = path_of(path)
     content = kit.read_toml(path)
     kit.check_file(path, content, "calibration", KEYS)
     kit.check_keys(str(path), content, KEYS)

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import check_positive
+from jaxveh._core.errors import check_kind, check_positive
 from jaxveh._core.parameter import positive
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.contract import Need, check_needs
@@ -242,6 +242,8 @@ def clean(recording: Recording, cleaning: RearAxleCleaning | None = None) -> Rec
 
     **Raises** `InputError` where a channel is missing, or a speed is NaN (fill it first with `recording.fill`).
     """
+    if cleaning is not None:
+        check_kind("cleaning", cleaning, AbstractCleaning, "Such as the `cleaning` of estimators.sideslip.live(car).")
     check_needs("sideslip", BLIND, recording)
     absent = {need.channel: jnp.full(len(recording), jnp.nan) for need in BLIND if need.channel not in recording}
-    return clean_recording(cleaning or RearAxleCleaning(), recording.replace(**absent))
+    return clean_recording(RearAxleCleaning() if cleaning is None else cleaning, recording.replace(**absent))

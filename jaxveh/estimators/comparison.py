@@ -10,8 +10,9 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_one_of
-from jaxveh._core.recording import Recording
+from jaxveh._core.errors import InputError, check_kind, check_one_of, real_array
+from jaxveh._core.names import as_names
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh.diagnostics import Score, delay, score_band
 from jaxveh.estimators.method import AbstractSmoothable, Answers, method_of
 from jaxveh.io import CarSpecification
@@ -56,7 +57,9 @@ def compare(
         raise InputError(
             f"compare: quantity = {quantity!r}: must be a module with METHODS, such as estimators.sideslip."
         )
-    names = list(quantity.METHODS) if methods is None else list(methods)
+    check_kind("car", car, CarSpecification, "io.read_car reads one from a file.")
+    check_recording("compare", recording)
+    names = as_names(quantity.METHODS if methods is None else methods, "methods")
     compared = Compared({}, {}, {})
     for name in names:
         check_one_of(f"{quantity.NAME}: method", name, quantity.METHODS)
@@ -79,9 +82,15 @@ def compare(
 def score_answers(found: Answers, name: str, truth: np.ndarray, which: np.ndarray | None = None) -> MethodScore:
     """Score the answers against a `truth` (T,) of the output `name`, in the rows where it is finite and `which` (T,) is True.
     **Raises** `InputError` where no row is left."""
+    check_kind("found", found, Answers, "compare(...).answers has one by each method's name.")
+    check_one_of("name", name, found.mean._fields)
     mean, std, known = (np.asarray(getattr(part, name)) for part in (found.mean, found.std, found.known))
-    truth = np.asarray(truth, float)
-    rows = np.isfinite(truth) & np.isfinite(mean) & (True if which is None else which)
+    truth = np.asarray(real_array("truth", truth), float)
+    told = np.ones(mean.shape, bool) if which is None else np.asarray(real_array("which", which), bool)
+    for what, array in (("truth", truth), ("which", told)):
+        if array.shape != mean.shape:
+            raise InputError(f"{what} has shape {array.shape}: must be {mean.shape}, one for each row.")
+    rows = np.isfinite(truth) & np.isfinite(mean) & told
     claimed = None if np.isnan(std[rows]).all() else np.where(np.isnan(std), 0.0, std)
     score = score_band(truth, mean, claimed, rows)
     sure = rows & known

@@ -8,8 +8,8 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
-from jaxveh._core.names import record
+from jaxveh._core.errors import InputError, check_kind
+from jaxveh._core.names import as_pairs, record
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, Answer
 
@@ -41,8 +41,9 @@ class Exchange(AbstractMethod):
     gives: tuple[tuple[str, str, str], ...] = eqx.field(static=True)
 
     def __init__(self, methods: Mapping[str, AbstractMethod], gives: Mapping[str, str]):
-        self.names, self.methods = tuple(methods), tuple(methods.values())
-        self.gives = tuple((channel, *said.partition(".")[::2]) for channel, said in gives.items())
+        named = as_pairs(methods, "Exchange: methods")
+        self.names, self.methods = tuple(name for name, _ in named), tuple(method for _, method in named)
+        self.gives = tuple(_source(channel, said) for channel, said in as_pairs(gives, "Exchange: gives"))
 
     def __check_init__(self):
         if not self.methods:
@@ -100,6 +101,13 @@ class Exchange(AbstractMethod):
                 channel: _value_of(answers[name], name, told, t) for channel, giver, told in self.gives if giver == name
             }
         return (memories, said), _together(answers)
+
+
+def _source(channel: str, said: str) -> tuple[str, str, str]:
+    """A channel, and the method and output that give it."""
+    check_kind(f"Exchange: gives[{channel!r}]", said, str, "Write method.output, such as speed.v_x.")
+    giver, _, name = said.partition(".")
+    return channel, giver, name
 
 
 def _value_of(answer: Answer, giver: str, name: str, like: Any) -> Any:

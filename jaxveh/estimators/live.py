@@ -14,6 +14,7 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh._core.parameter import check_parameters
+from jaxveh._core.parts import check_parts
 from jaxveh._core.recording import Recording, time_for
 from jaxveh.estimators.parameter_bands import Members
 from jaxveh.numerics import apart
@@ -122,6 +123,9 @@ class Live(eqx.Module):
     cleaning: AbstractCleaning
     key: Any = None
     members: Members | None = None
+
+    def __check_init__(self):
+        check_parts(self)
 
     def init(self, t, channels: Mapping[str, Any]) -> tuple[LiveBelief, LiveAnswer]:
         """The belief after the first row, and its answer.

@@ -28,6 +28,7 @@ from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.estimated import Estimated
 from jaxveh._core.names import record
 from jaxveh._core.parameter import check_parameters
+from jaxveh._core.parts import check_parts
 from jaxveh._core.result import Result, code
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning, AsItIs, row_of
@@ -214,6 +215,9 @@ class LiveMethod(eqx.Module):
     """
 
     method: AbstractMethod
+
+    def __check_init__(self):
+        check_parts(self)
 
     def init(self, t, channels: Mapping[str, Any]) -> tuple[Any, Answer]:
         """The memory after the first row, and the answer to it. **Raises** `InputError` for a needed channel not given."""

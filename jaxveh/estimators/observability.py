@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_kind
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Observability, observability_at
 from jaxveh.statespace import Row, StateSpace, kit
@@ -16,6 +16,9 @@ def predict_measurements(model: StateSpace, rows: Row, start) -> tuple[dict, dic
 
     **Returns** two mappings by channel of (T,) arrays: the predictions, and whether the channel was measured.
     """
+    kit.check_model("predict_measurements", model)
+    check_kind("rows", rows, Row, "model.rows(recording) makes them.")
+    check_kind("start", start, type(model.prior.mean), "The usual one is model.prior.mean.")
 
     def body(state, pair):
         now, then = pair
@@ -37,6 +40,7 @@ def observe(model: StateSpace, recording: Recording, known_start: bool = True) -
     Of the measurements only their presence is used, not their values. `known_start=False` adds the start states as unknowns
     with the prior's spread. **Raises** `InputError` for a model without parameters.
     """
+    kit.check_model("observe", model)
     if model.chosen is None:
         raise InputError("observability: the model estimates no parameter; give `estimate=` or `with_parameters`.")
     rows, n = model.rows(recording), len(model.chosen.states)

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.bijectors import Interval
+from jaxveh._core.errors import check_kind
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.two_axles import AbstractTwoAxles
@@ -270,6 +271,7 @@ INPUTS = (
 
 def rear_axle_model(system: RearAxle) -> StateSpace:
     """The state space for a real log, with initial noise levels for a fit (stated in the code, unit by unit)."""
+    check_kind("system", system, RearAxle)
     quick = (system.wheelbase / USUAL_WHEELBASE) ** -0.5
     unit = lambda time: (2.0 / time) ** 0.5
     noise = {

@@ -11,12 +11,14 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.bijectors import AbstractBijector
-from jaxveh._core.errors import InputError, check_at_least
+from jaxveh._core.errors import InputError, check_at_least, check_kind
 from jaxveh._core.names import check_names, record, record_type
 from jaxveh._core.parameter import Where, strong
+from jaxveh._core.recording import check_recording
 from jaxveh.sensors import Instrumented, SensorSet
 from jaxveh.statespace import (
     RK4,
+    AbstractNoise,
     AbstractProcessNoise,
     Continuous,
     Gaussian,
@@ -25,7 +27,9 @@ from jaxveh.statespace import (
     Prior,
     Propagate,
     StabilisedRK4,
+    StateDependent,
     StateSpace,
+    kit,
     with_parameters,
 )
 from jaxveh.vehicles import AbstractVehicle
@@ -88,7 +92,7 @@ def state_space(
     system = Instrumented(strong(car), _without_noise(sensors))
     states = system.state_type._fields
     usual = StabilisedRK4() if vehicles_kit.has_fast_states(car) else RK4()
-    transition = Propagate(_derivatives, solver or usual, steps)
+    transition = Propagate(_derivatives, usual if solver is None else solver, steps)
     model = StateSpace(
         system=system,
         transition=HeldBelow(transition, minimum_speed) if TOLD_SPEED in system.inputs else transition,
@@ -129,6 +133,7 @@ def _check_kinds(car, sensors, estimate) -> None:
 def _noise(sensors: SensorSet, given: MeasurementNoise | None) -> MeasurementNoise:
     if given is None:
         return sensors.noise
+    check_kind("measurement_noise", given, AbstractNoise | StateDependent, "Take a noise law of jaxveh.statespace.")
     if sorted(given.names) != sorted(sensors.channels):
         raise InputError(
             f"measurement_noise is of {', '.join(given.names)}: must be of the sensors' channels, {', '.join(sensors.channels)}."
@@ -226,6 +231,8 @@ def _report_names(system: Instrumented, report: tuple[str, ...] | None) -> tuple
 
 def held_rows(model: StateSpace, recording) -> jax.Array:
     """(T,) booleans: where the states were held because the car was slower than the model's minimum speed."""
+    kit.check_model("held_rows", model)
+    check_recording("held_rows", recording)
     function = model.transition_function
     while not isinstance(function, HeldBelow):
         function = getattr(function, "function", None)

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, path_of
 from jaxveh.io import replacing_file
 from jaxveh.statespace import AbstractBelief
 
@@ -29,7 +29,7 @@ def save_belief(path: str | Path, belief: AbstractBelief) -> Path:
 
     **Raises** `InputError` for another suffix, or where the file cannot be written.
     """
-    path = Path(path)
+    path = path_of(path)
     if path.suffix != ".npz":
         raise InputError(f"path = {path}: must end in .npz.")
     arrays = {name: np.asarray(_words(leaf)) for name, leaf in _leaves_by_name(belief).items()}
@@ -45,7 +45,7 @@ def load_belief(path: str | Path, like: B) -> B:
 
     **Raises** `InputError` if the file is of another filter, number of particles, model or precision; it names the difference.
     """
-    path = Path(path)
+    path = path_of(path)
     if not path.is_file():
         raise InputError(f"path = {path}: there is no such file.")
     expected = _leaves_by_name(like)

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from jaxveh._core.errors import InputError, check_key, check_whole
+from jaxveh._core.errors import InputError, check_at_least, check_key, check_kind, check_whole
 from jaxveh._core.parameters import Parameters
 from jaxveh.fitting.problem import AbstractProblem, by_name, in_units
 from jaxveh.fitting.solve import MOST_STEPS, optimum
@@ -46,7 +46,9 @@ def bootstrap(
 
     **Raises** `InputError` for fewer than two fits, fewer than five parts, or `max_steps` below one.
     """
+    check_kind("problem", problem, AbstractProblem, "fitting.pose_rig, pose_likelihood and their like make one.")
     check_whole("count", count, 2)
+    check_at_least("tolerance", tolerance, 0)
     check_whole("max_steps", max_steps)
     check_key("bootstrap", key)
     parts = problem.units()

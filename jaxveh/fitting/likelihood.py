@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jax import lax
 
+from jaxveh._core.errors import check_key
 from jaxveh._core.parameter import Parameter, Where, pick, strong
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, Gradient, scan
@@ -88,6 +89,9 @@ def pose_likelihood(
     key=None,
 ) -> LikelihoodProblem:
     """The problem of `maximum_likelihood`, for `solve`; arguments and errors as there."""
+    kit.check_told(filter, model)
+    if key is not None:
+        check_key("maximum_likelihood", key)
     kit.check_gradients("maximum_likelihood", filter, Gradient.on_average)
     model = strong(model)
     filter.check(model)

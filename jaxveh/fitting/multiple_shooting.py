@@ -12,7 +12,7 @@ import numpy as np
 import optimistix as optx
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check_positive, is_concrete
+from jaxveh._core.errors import InputError, check_kind, check_positive, is_concrete
 from jaxveh._core.parameter import Parameter, Where, pick, put, strong
 from jaxveh._core.recording import Recording
 from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, scalar_parameters
@@ -115,6 +115,8 @@ def pose_shooting(
     """The problem of `multiple_shooting` over segments (see `cut`, `cut_rows`), for `solve`; arguments and errors as there."""
     check_positive("tie", tie)
     model = strong(model)
+    kit.check_model("multiple_shooting", model)
+    check_kind("segments", segments, Segments, "fitting.cut makes them.")
     if model.chosen is None and where is None:
         raise InputError("multiple_shooting: the model estimates no parameter; give `where=`, or `with_parameters`.")
     if model.chosen is not None and where is not None:

@@ -11,9 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 
-from jaxveh._core.errors import InputError, check_positive, check_whole, is_concrete
+from jaxveh._core.errors import InputError, check_kind, check_positive, check_whole, is_concrete
 from jaxveh._core.parameter import Parameter, Where, pick, strong
-from jaxveh._core.progress import Progress, silent
+from jaxveh._core.progress import Progress, check_progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, scan
 from jaxveh.fitting.filter_problem import AbstractFilterProblem
@@ -175,6 +175,12 @@ def pose_prediction_error(
     warm_up: int = 0,
 ) -> PredictionErrorProblem:
     """The problem of `prediction_error`, for `solve`; arguments and errors as there."""
+    kit.check_told(filter, model)
+    if target is not None:
+        check_kind("target", target, Target, "fitting.Target(name, values, weight, bend) makes one.")
+    if centre is not None:
+        kit.check_model("centre", centre)
+    check_whole("warm_up", warm_up, 0)
     recordings = as_list(recordings)
     if len({len(recording) for recording in recordings}) != 1:
         raise InputError("recordings: must have the same number of rows; cut them to one length.")
@@ -227,6 +233,7 @@ def prediction_error(
     """
     check_positive("tolerance", tolerance)
     check_whole("max_steps", max_steps)
+    check_progress(progress)
     problem = pose_prediction_error(
         filter, model, recordings, where, prior=prior, centre=centre, target=target, warm_up=warm_up
     )

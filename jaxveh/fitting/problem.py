@@ -83,8 +83,10 @@ def by_name(chosen: tuple[Parameter, ...], values) -> Parameters:
 def scalar_parameters(model: Any, where: Where) -> tuple[Parameter, ...]:
     """The scalar parameters that `where` picks from a model.
 
-    **Raises** `InputError` as `resolve` does, and for arrays.
+    **Raises** `InputError` as `resolve` does, for arrays, and for None.
     """
+    if where is None:
+        raise InputError("where = None: must be a function, such as lambda model: model.system.vehicle.front.B.")
     chosen = resolve(model, where)
     for p, value in zip(chosen, pick(model, chosen), strict=True):
         if jnp.ndim(value) > 0:

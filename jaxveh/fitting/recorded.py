@@ -8,13 +8,16 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
+from jaxveh._core.names import as_several
 from jaxveh._core.parameter import Parameter, prior_spread
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, check_recording
 
 
 def as_list(recordings: Recording | Sequence[Recording]) -> list[Recording]:
     """One recording or several, as a list; raises `InputError` for an empty list."""
-    recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    recordings = [recordings] if isinstance(recordings, Recording) else list(as_several(recordings, "recordings"))
+    for recording in recordings:
+        check_recording("recordings", recording)
     if not recordings:
         raise InputError("recordings: empty; give at least one recording.")
     return recordings

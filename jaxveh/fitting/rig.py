@@ -11,11 +11,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import FilterError, InputError, check_at_least, check_one_of, check_positive
-from jaxveh._core.names import check_names
+from jaxveh._core.errors import (
+    FilterError,
+    InputError,
+    check_at_least,
+    check_kind,
+    check_one_of,
+    check_positive,
+    check_whole,
+)
+from jaxveh._core.names import as_names, as_pairs, check_names
 from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, resolve
 from jaxveh._core.parameters import Parameters
-from jaxveh._core.progress import Progress, silent
+from jaxveh._core.progress import Progress, check_progress, silent
 from jaxveh._core.shown import above
 from jaxveh.fitting.problem import SearchEnd, by_name, on_line, scalar_parameters
 from jaxveh.fitting.result import AbstractFit
@@ -129,6 +137,9 @@ def fit_rig(
     `FilterError` if the joint fit does not converge, unless `throw=False`.
     """
     check_at_least("max_steps", max_steps, 1)
+    check_at_least("tolerance", tolerance, 0)
+    check_progress(progress)
+    check_whole("folds", folds, 0)
     data, plan, aside = _prepare(law, rig, where, free, prior, measured, weights, bounds, robust, max_steps, tolerance)
     parts = fold_of(rig, folds) if folds else np.full(rig.load.shape, -1)
     joint = _joint(data)
@@ -180,7 +191,7 @@ def pose_rig(
     the noise of the fit. Other arguments and errors as in `fit_rig`.
     """
     data, _, aside = _prepare(law, rig, where, free, prior, measured, weights, bounds, robust)
-    levels = data.noise(law) if noise is None else dict(noise)
+    levels = data.noise(law) if noise is None else dict(as_pairs(noise, "noise"))
     check_names("noise", levels, data.channels)
     missing = [name for name in data.channels if name not in levels]
     if missing:
@@ -194,9 +205,12 @@ def _prepare(
     law, rig, where, free, prior, measured, weights, bounds, robust, max_steps: int = 500, tolerance: float = 1e-6
 ) -> tuple[RigData, list[Stage], tuple[str, ...]]:
     """The data for all stages, after every check, the stages before the joint one, and the coefficients held by default."""
+    check_kind("law", law, AbstractTyre, "fitting.starting_tyre(name, rig) makes one.")
+    check_kind("rig", rig, RigTable, "io.read_rig_table reads one.")
+    free, measured = as_names(free, "free") or (), as_names(measured, "measured")
+    extra, limits = (dict(as_pairs({} if v is None else v, n)) for n, v in (("weights", weights), ("bounds", bounds)))
     contact = contact_of(rig)
     channels = _channels(law, rig, contact, measured)
-    extra = {} if weights is None else dict(weights)
     check_names("weights", extra, channels)
     for name, weight in extra.items():
         check_positive(f"weights[{name!r}]", weight)
@@ -204,7 +218,7 @@ def _prepare(
     plan = stages_of(law, rig, channels, chosen, free)
     _check_free(free, plan)
     aside = tuple(name for stage in plan for name in stage.aside)
-    settings = Settings(extra, dict(bounds or {}), robust, max_steps, tolerance)
+    settings = Settings(extra, limits, robust, max_steps, tolerance)
     data = RigData(rig, contact, channels, (*_names(law, plan, chosen), *aside), settings)
     data.check(law)
     if prior is not None:

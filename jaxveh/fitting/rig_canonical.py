@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import equinox as eqx
 
+from jaxveh._core.errors import check_kind
+from jaxveh._core.names import as_names
 from jaxveh.fitting.rig_data import leaf_of
 from jaxveh.tyres import MFTyre
 
@@ -77,6 +79,8 @@ def canonical(tyre: MFTyre, fixed: Collection[str] = ()) -> MFTyre:
     `fixed`: names of coefficients that must not change, such as those that a user holds or bounds; a twin that would change the
     sign of one of them, unless it is zero, is skipped. A leading coefficient of zero stays.
     """
+    check_kind("tyre", tyre, MFTyre)
+    fixed = as_names(fixed, "fixed") or ()
     # No twin changes the lead of another one: no lead is in another twin's `others`.
     for twin in TWINS:
         if float(leaf_of(tyre, twin.lead)) >= 0:

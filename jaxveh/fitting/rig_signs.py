@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxveh._core.errors import check_kind
 from jaxveh.fitting.rig_stages import LEAST_SPREAD
 from jaxveh.io import RigTable
 
@@ -50,6 +51,7 @@ class WrongSign(NamedTuple):
 
 def wrong_signs(rig: RigTable) -> tuple[WrongSign, ...]:
     """The slopes of a rig table that no tyre has, as in data whose axes were declared wrongly."""
+    check_kind("rig", rig, RigTable, "io.read_rig_table reads one.")
     found = []
     for pair, sign in EXPECTED.items():
         channel, name = pair.split(", ")

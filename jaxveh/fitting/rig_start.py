@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_one_of
+from jaxveh._core.errors import InputError, check_kind, check_one_of
 from jaxveh.fitting.rig_signs import SMALL, wrong_signs
 from jaxveh.fitting.rig_stages import LEAST_SPREAD
 from jaxveh.io import RigTable
@@ -147,6 +147,7 @@ def starting_tyre(model: str, rig: RigTable) -> AbstractTyre:
     (`rig_signs.wrong_signs`): for a tyre that does have it, start from a tyre of your own.
     """
     check_one_of("model", model, tuple(RIG_STARTS))
+    check_kind("rig", rig, RigTable, "io.read_rig_table reads one.")
     for wrong in wrong_signs(rig):
         raise InputError(f"{wrong.words} If they do, start from a tyre of your own (--start).")
     return RIG_STARTS[model](rig_facts(rig))

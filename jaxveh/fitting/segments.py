@@ -12,7 +12,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, check
 from jaxveh._core.recording import Recording
 from jaxveh.fitting.recorded import as_list
-from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace import Row, StateSpace, kit
 
 
 class Segments(NamedTuple):
@@ -32,6 +32,7 @@ def cut(model: StateSpace, recordings: Recording | Sequence[Recording], window: 
     A window longer than every recording is as long as the longest. Raises `InputError` for one that is not positive, or shorter
     than two steps.
     """
+    kit.check_model("cut", model)
     recordings = as_list(recordings)
     time = np.asarray(recordings[0].time)
     check("window", window, lambda _: True, "a time in seconds")

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jaxveh._core.errors import check_whole
+from jaxveh._core.errors import check_at_least, check_kind, check_whole
 from jaxveh._core.result import Result, code
 from jaxveh.fitting.problem import AbstractProblem, SearchEnd, by_name, in_units
 from jaxveh.fitting.result import Fit
@@ -32,7 +32,9 @@ def solve(
 
     **Returns** a `Fit`; its `result` states how it ended. **Raises** `InputError` for `max_steps` below one.
     """
+    check_kind("problem", problem, AbstractProblem, "fitting.pose_shooting, pose_likelihood and their like make one.")
     check_whole("max_steps", max_steps)
+    check_at_least("tolerance", tolerance, 0)
     # As an array, so that another tolerance does not compile another program.
     return _solve(problem, start, jnp.asarray(tolerance), max_steps=max_steps, standard_errors=standard_errors)
 

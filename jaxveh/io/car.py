@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_one_of
+from jaxveh._core.errors import InputError, check, check_one_of, path_of
 from jaxveh.io.car_table import CarTable
 from jaxveh.io.files import write_text
 from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text
@@ -215,7 +215,7 @@ def read_car(path: str | os.PathLike) -> CarSpecification:
     **Raises** `InputError` naming the file and: the line of broken TOML, a key that is missing or unknown (with
     similar ones), or a value with its allowed range.
     """
-    path = Path(path)
+    path = path_of(path)
     content = read_toml(path)
     check_file(path, content, "car", [entry.name for entry in fields(CarSpecification)])
     return car_of_toml(content, str(path), path.parent)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
-from jaxveh._core.errors import InputError, check, check_finite, check_one_of
+from jaxveh._core.errors import InputError, check, check_finite, check_one_of, path_of
 from jaxveh.io.toml import check_file, check_keys, read_toml, shorten, toml_number, toml_text
 
 CHANNEL_MAP_SCHEMA = """\
@@ -108,7 +107,7 @@ def read_channel_map(path: str | os.PathLike) -> ChannelMap:
     **Raises** `InputError` naming file and line of broken TOML, unknown keys with similar ones, values of a wrong
     kind.
     """
-    path = Path(path)
+    path = path_of(path)
     content = read_toml(path)
     keys = ("time", "channels", "csv")
     check_file(path, content, "channel map", keys)

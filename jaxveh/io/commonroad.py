@@ -9,7 +9,7 @@ from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, path_of
 from jaxveh.io.decimals import decimal
 from jaxveh.io.files import check_readable
 from jaxveh.io.naming import check_known
@@ -124,7 +124,7 @@ def read_commonroad(path: str | os.PathLike, tyre: str | os.PathLike | None = No
     tyre_keys = {f"tire.{name}" for name in TYRE_COEFFICIENTS}
     found: dict[str, Any] = {}
     coefficients: dict[str, Any] = {}
-    for file in [Path(path)] if tyre is None else [Path(path), Path(tyre)]:
+    for file in [path_of(path)] if tyre is None else [path_of(path), path_of(tyre)]:
         for key, value in _flat(_load(file)).items():
             check_known(str(file), "key", key, [*keys, *sorted(tyre_keys)])
             into, name = (coefficients, key[5:]) if key in tyre_keys else (found, keys[key])

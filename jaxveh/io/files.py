@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from jaxveh._core.errors import InputError, did_you_mean
+from jaxveh._core.errors import InputError, did_you_mean, path_of
 
 
 def check_readable(path: Path) -> None:
@@ -49,7 +49,7 @@ def replacing_file(path: str | os.PathLike, overwrite: bool = False) -> Iterator
 
     **Raises** `InputError` if `path` exists and `overwrite` is False, or the system refuses to write.
     """
-    path = Path(path)
+    path = path_of(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file.")
     if path.exists() and not overwrite:
@@ -70,7 +70,7 @@ def making_folder(path: str | os.PathLike) -> Iterator[Path]:
 
     **Raises** `InputError` if `path` exists, or the system refuses to write.
     """
-    path = Path(path)
+    path = path_of(path)
     if path.exists():
         raise InputError(f"{path}: exists already; name a new folder.")
     with _refusals_in_words(path):

@@ -6,12 +6,11 @@ import heapq
 import json
 import os
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, path_of
 from jaxveh.io.files import check_suffix, replacing_file
 from jaxveh.io.log import numeric
 from jaxveh.io.optional import require
@@ -33,7 +32,7 @@ def write_topics(topics: Mapping[str, Any], path: str | os.PathLike, *, overwrit
     **Raises** `InputError` for another suffix, no topic, a frame without `time` or with columns that are not numbers, times that
     cannot be time stamps, or if the file exists and `overwrite` is False.
     """
-    path = Path(path)
+    path = path_of(path)
     check_suffix(path, (MCAP_SUFFIX,), "recording of topics")
     writing = require("mcap.writer", "writing MCAP", "mcap")
     if not topics:

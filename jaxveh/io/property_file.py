@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, path_of
 from jaxveh.io.decimals import decimal
 from jaxveh.io.files import check_readable, replacing_file
 
@@ -172,7 +172,7 @@ def read_property_file(path: str | Path) -> PropertyFile:
     **Raises** `InputError` for a file that is missing, has no section with entries, or is not text in UTF-8 or a
     single-byte encoding.
     """
-    path = Path(path)
+    path = path_of(path)
     if path.suffix.lower() == ".toml":
         raise InputError(
             f"{path}: is TOML: must be a tyre property file (.tir). The parameter file of a law, as `jaxveh tyre fit "

@@ -11,7 +11,7 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning
+from jaxveh._core.errors import InputError, JaxvehWarning, path_of
 from jaxveh._core.recording import Recording, check_recording
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
@@ -127,7 +127,7 @@ def _read(
     method: str,
     as_saved: bool,
 ) -> Recording:
-    path = Path(path)
+    path = path_of(path)
     if (advice := _ELSEWHERE.get(path.suffix.lower())) is not None:
         raise InputError(
             f"{path}: suffix {path.suffix!r} is not read: {advice}; a log must end in one of {', '.join(_OPEN)}."
@@ -191,7 +191,7 @@ def write_columns(
     overwrite: bool,
 ) -> None:
     """Write columns (T,) over `time` (T,) in the format of the suffix, completely or not at all."""
-    path = Path(path)
+    path = path_of(path)
     suffix = check_suffix(path, _WRITE, "recording")
     if "time" in columns:
         raise InputError(f"{path}: a channel is named `time`, which is the name of the time column; rename it.")

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from jaxveh._core.errors import path_of
 from jaxveh._core.labelled import Labelled
 from jaxveh._core.recording import Recording
 from jaxveh.io.datasets import result_of
@@ -23,7 +24,7 @@ RESULT_SUFFIXES = tuple(_WRITE)
 
 def save_result(result: Any, path: str | os.PathLike, overwrite: bool = False) -> None:
     """Write a result as `.nc` or `.parquet`, completely or not at all; a recording in any format of `write_recording`."""
-    path = Path(path)
+    path = path_of(path)
     if isinstance(result, Recording) and result.time.ndim == 1:
         write_recording(result, path, overwrite=overwrite)
         return
@@ -34,7 +35,7 @@ def save_result(result: Any, path: str | os.PathLike, overwrite: bool = False) -
 
 def load_result(kind: type, path: str | os.PathLike) -> Any:
     """Read a result of a kind that `save_result` wrote; a recording from any log that `read_recording` reads."""
-    path = Path(path)
+    path = path_of(path)
     if kind is Recording and path.suffix.lower() not in _READ:
         return load_recording(path)
     suffix = check_suffix(path, _READ, f"file of {kind.__name__}")

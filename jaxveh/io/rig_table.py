@@ -10,7 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_one_of
+from jaxveh._core.errors import InputError, check_one_of, path_of
+from jaxveh._core.names import as_several
 from jaxveh.io.csv_log import read_columns
 from jaxveh.io.files import check_readable, check_suffix
 from jaxveh.io.log import numeric, split_unit
@@ -154,7 +155,7 @@ def read_rig_table(
         check_one_of("axes", axes, AXES)
     for name in measured:
         check_one_of("measured", name, RIG_CHANNELS)
-    paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(one) for one in path]
+    paths = [path_of(path)] if isinstance(path, (str, Path)) else [path_of(one) for one in as_several(path, "path")]
     if not paths:
         raise InputError("read_rig_table: no file; name at least one.")
     tables = [_read(one, axes, tuple(measured)) for one in paths]

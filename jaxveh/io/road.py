@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_one_of
+from jaxveh._core.errors import InputError, check, check_one_of, path_of
 from jaxveh.io.files import write_text
 from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text
 
@@ -84,7 +83,7 @@ def read_road(path: str | os.PathLike) -> RoadSpecification:
     **Raises** `InputError` naming the file and: the line of broken TOML, an unknown key (with similar ones), or
     a value with its allowed range.
     """
-    path = Path(path)
+    path = path_of(path)
     content = read_toml(path)
     names = [entry.name for entry in fields(RoadSpecification)]
     check_file(path, content, "road", names)

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning
+from jaxveh._core.errors import InputError, JaxvehWarning, path_of
 from jaxveh.io.csv_log import read_below
 from jaxveh.io.decimals import is_number
 from jaxveh.io.files import check_readable
@@ -125,7 +125,7 @@ def read_ttc(path: str | Path) -> TtcTable:
     **Raises** `InputError`, naming the file and the column, for a file without `FZ`, or with neither `SA` nor `SL`; for
     unknown units, cells that are not numbers, columns of different lengths, and an `SR` that is swept without an `SL`.
     """
-    path = Path(path)
+    path = path_of(path)
     check_readable(path)
     cells = _matlab(path) if path.suffix.lower() == ".mat" else _text(path)
     if not is_ttc(cells.load):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, path_of
 from jaxveh.io.decimals import decimal
 from jaxveh.io.files import check_readable
 from jaxveh.io.toml import shorten
@@ -69,7 +69,7 @@ def read_tydex(path: str | Path) -> TydexFile:
     **Raises** `InputError`, with the line, for a file without **MEASURCHANNELS or **MEASURDATA, a channel that occurs twice, a
     row with another number of columns than there are channels, and a cell that is not a number (`NOTAVAIL` is a missing one).
     """
-    path = Path(path)
+    path = path_of(path)
     check_readable(path)
     # Descriptions and comments may contain bytes that are not UTF-8 (a degree sign).
     return parse_tydex(path.read_text(encoding="utf-8", errors="replace"), str(path))

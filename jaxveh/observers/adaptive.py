@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_at_least, check_positive
+from jaxveh._core.errors import InputError, check, check_at_least, check_finite, check_positive
 from jaxveh._core.names import as_pairs, check_names
 from jaxveh.observers.base import AbstractObserver, advance, check_gain, observe
 from jaxveh.observers.luenberger import array
@@ -22,7 +22,15 @@ def _gains(given: Mapping[str, Any]) -> dict[str, jax.Array]:
 
 
 def _bounds(given: Mapping[str, tuple[float, float]]) -> tuple[tuple[str, float, float], ...]:
-    return tuple((name, float(low), float(high)) for name, (low, high) in as_pairs(given, "Adaptive.bounds"))
+    return tuple(_bound(name, ends) for name, ends in as_pairs(given, "Adaptive.bounds"))
+
+
+def _bound(name: str, ends: tuple[float, float]) -> tuple[str, float, float]:
+    try:
+        low, high = map(float, ends)
+    except (TypeError, ValueError):
+        raise InputError(f"Adaptive.bounds of {name} = {ends!r}: must be (low, high), two numbers.") from None
+    return name, low, high
 
 
 class Adaptive(AbstractObserver):
@@ -68,6 +76,7 @@ class Adaptive(AbstractObserver):
     dead_zone: jax.Array = eqx.field(converter=array, default=0.0)
 
     def __check_init__(self):
+        check_finite("Adaptive.gain", self.gain)
         if not self.rate:
             raise InputError("Adaptive.rate is empty: name at least one parameter, or use a Luenberger observer.")
         for name, value in self.rate.items():

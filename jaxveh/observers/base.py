@@ -117,12 +117,12 @@ def check_gain(name: str, gain: Any, model: StateSpace, states: tuple[str, ...] 
     """Raise `InputError` unless a gain is finite and (states, channels); `states`: by default the model's."""
     states = model.states if states is None else states
     expected = (len(states), len(model.channels))
+    check_finite(name, gain)
     if gain.shape != expected:
         raise InputError(
             f"{name} has shape {gain.shape}: must be {expected}, states {', '.join(states)} by channels "
             f"{', '.join(model.channels)}."
         )
-    check_finite(name, gain)
 
 
 def check_one_or_each(name: str, values: Any, each: tuple[str, ...]) -> None:

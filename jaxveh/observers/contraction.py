@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.names import as_several
 from jaxveh.observers.base import check_gain
 from jaxveh.observers.luenberger import array
 from jaxveh.observers.poles import slopes_without
-from jaxveh.statespace import StateSpace
+from jaxveh.statespace import StateSpace, kit
 
 
 def contraction_rate(
@@ -29,8 +30,11 @@ def contraction_rate(
 
     **Raises** `InputError` if the observer is not stable at the first point.
     """
+    kit.check_model("contraction_rate", model)
     check_positive("dt", dt, "s")
-    points, gain = list(points), array(gain)
+    points, gain = as_several(points, "points"), array(gain)
+    if any(not isinstance(point, tuple) or len(point) != 2 for point in points):
+        raise InputError("points: each must be a pair, a state (its NamedTuple) and inputs by name.")
     if not points:
         raise InputError("contraction_rate: there is no point; give at least one.")
     check_gain("gain", gain, model)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.names import as_names
 from jaxveh.observers.luenberger import Luenberger
 from jaxveh.observers.poles import place_poles
 from jaxveh.statespace import StateSpace, kit
@@ -30,8 +31,10 @@ def extended_state(
     **Raises** `InputError` for a model without disturbances, for a bandwidth that is not positive, and as `place_poles` does:
     each disturbance must reach a channel, and the channels must be able to distinguish them.
     """
+    kit.check_model("extended_state", model)
     if not any(name.startswith(kit.DISTURBANCE_PREFIX) for name in model.states):
         raise InputError("extended_state: the model has no disturbances; statespace.with_disturbances adds them.")
     check_positive("bandwidth", bandwidth, "1/s")
+    leave = as_names(leave, "leave") or ()
     poles = np.full(len(model.states) - len(set(leave)), -float(bandwidth))
     return Luenberger(place_poles(model, poles, dt=dt, x=x, u=u, leave=leave))

@@ -7,14 +7,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import check, float_array
+from jaxveh._core.errors import check, check_finite, float_array
 from jaxveh.observers.base import AbstractObserver, advance, check_gain, check_one_or_each
 
 
-def array(value: Any) -> jax.Array:
+def array(value: Any) -> Any:
     """A float array (not weakly typed) from numbers or from an array; what is none is left to the check that knows its name."""
     try:
-        return float_array(value if eqx.is_array(value) else np.asarray(value, float))
+        # None would become NaN.
+        return value if value is None else float_array(value if eqx.is_array(value) else np.asarray(value, float))
     except (TypeError, ValueError):
         return value
 
@@ -41,6 +42,9 @@ class Luenberger(AbstractMemoryless):
 
     gain: jax.Array = eqx.field(converter=array)
 
+    def __check_init__(self):
+        check_finite("Luenberger.gain", self.gain)
+
     def check(self, model):
         check_gain("Luenberger.gain", self.gain, model)
 
@@ -63,6 +67,8 @@ class SlidingMode(AbstractMemoryless):
     boundary: jax.Array = eqx.field(converter=array)
 
     def __check_init__(self):
+        check_finite("SlidingMode.gain", self.gain)
+        check_finite("SlidingMode.switching", self.switching)
         check("SlidingMode.boundary", self.boundary, lambda b: b > 0, "positive")
 
     def check(self, model):

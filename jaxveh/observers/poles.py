@@ -9,11 +9,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_positive
-from jaxveh._core.names import check_names, record
+from jaxveh._core.errors import InputError, check, check_kind, check_positive
+from jaxveh._core.names import as_names, as_pairs, check_names, record
 from jaxveh.observers.base import observe
 from jaxveh.observers.chains import chained_gain
-from jaxveh.statespace import Row, StateSpace, cast
+from jaxveh.statespace import Row, StateSpace, cast, kit
 
 
 def place_poles(
@@ -30,10 +30,9 @@ def place_poles(
     **Raises** `InputError` for poles that are not stable, for a state that cannot be left out, and for a model that is not
     observable, naming the mode that does not reach the channels.
     """
-    check_positive("dt", dt, "s")
     F, H, kept = slopes_without(model, dt, x, u, leave)
     names = tuple(model.states[i] for i in kept)
-    poles = np.asarray(poles)
+    poles = _as_poles(poles)
     if poles.shape != (len(kept),):
         raise InputError(f"poles have shape {poles.shape}: must be ({len(kept)},), one for each of {', '.join(names)}.")
     if not (poles.real < 0).all():
@@ -44,6 +43,14 @@ def place_poles(
     gain = np.zeros((len(model.states), len(model.channels)))
     gain[kept] = _place_poles(F.astype(float), H.astype(float), np.exp(poles * dt))
     return gain
+
+
+def _as_poles(poles: Any) -> np.ndarray:
+    """The poles as an array of numbers, which may be complex."""
+    try:
+        return np.asarray(poles, complex) if np.iscomplexobj(np.asarray(poles)) else np.asarray(poles, float)
+    except (TypeError, ValueError):
+        raise InputError(f"poles = {poles!r}: must be numbers (1/s), one for each state.") from None
 
 
 def _place_poles(F: np.ndarray, H: np.ndarray, poles: np.ndarray) -> np.ndarray:
@@ -69,10 +76,15 @@ def linearised_step(model: StateSpace, dt: float, x: Any = None, u: Any = None) 
 
     In the default precision, whatever the model's: gains are computed in float64 if it is enabled.
     """
+    kit.check_model("linearised_step", model)
+    check_positive("dt", dt, "s")
     dtype = jax.dtypes.canonicalize_dtype(float)
     model = cast(model, dtype)
     x = model.prior.mean if x is None else x
-    given = dict(u or {})
+    check_kind("x", x, type(model.prior.mean), "The default is the prior's mean, model.prior.mean.")
+    given = dict(as_pairs({} if u is None else u, "u"))
+    for name, value in (*x._asdict().items(), *given.items()):
+        check(name, value, np.isfinite, "finite")
     check_names("u", given, model.inputs)
     inputs = record("Inputs", {name: jnp.asarray(given.get(name, 0.0), dtype) for name in model.inputs})
     vector = jnp.stack([jnp.asarray(value, dtype) for value in x])
@@ -97,6 +109,8 @@ def slopes_without(model: StateSpace, dt: float, x: Any, u: Any, leave: tuple[st
 
     **Raises** `InputError` if another state or a channel depends on a state in `leave`.
     """
+    kit.check_model("slopes", model)
+    leave = as_names(leave, "leave") or ()
     check_names("leave", leave, model.states)
     F, H = linearised_step(model, dt, x, u)
     left = [i for i, name in enumerate(model.states) if name in leave]

@@ -10,10 +10,19 @@ import diffrax
 import jax
 import numpy as np
 
-from jaxveh._core.errors import FilterError, InputError, JaxvehWarning, check_key, check_one_of, is_concrete, word_for
+from jaxveh._core.errors import (
+    FilterError,
+    InputError,
+    JaxvehWarning,
+    check_key,
+    check_kind,
+    check_one_of,
+    is_concrete,
+    word_for,
+)
 from jaxveh._core.names import as_mapping
 from jaxveh._core.parameter import strong
-from jaxveh._core.progress import Progress, silent
+from jaxveh._core.progress import Progress, check_progress, silent
 from jaxveh._core.recording import TRUTH, Recording
 from jaxveh._core.result import Result
 from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre
@@ -96,7 +105,7 @@ def simulate(
     finite (with `throw`, and not under jit: check the channels there).
     """
     sensors = _suite_of(sensors)
-    _check_asked(until, key)
+    _check_asked(until, key, adjoint, progress)
     driven = driven_car(car, manoeuvre, sensors if isinstance(sensors, SensorSet) else None, road)
     duration, values = driven.driver.duration, _start_values(start)
     rows = device_rows(sensors, duration) if isinstance(sensors, Suite) else None
@@ -134,9 +143,13 @@ def _suite_of(sensors: Any) -> SensorSet | Suite | None:
     )
 
 
-def _check_asked(until: Any, key: Any) -> None:
+def _check_asked(until: Any, key: Any, adjoint: Any, progress: Any) -> None:
     if key is not None:
         check_key("simulate", key)
+    if adjoint is not None:
+        advice = "Take one of diffrax, such as diffrax.ForwardMode() (called), or None."
+        check_kind("simulate: adjoint", adjoint, diffrax.AbstractAdjoint, advice)
+    check_progress(progress)
     if not (until is None or isinstance(until, Event)):
         raise InputError(
             f"simulate: until = {_describe(until)}: must be an Event such as simulation.standstill() (called), or None."
@@ -191,7 +204,11 @@ def _check_not_placed(car: AbstractVehicle) -> None:
 
 def _choice(solver, controller, max_step) -> SolverChoice | None:
     """The solver that the caller asks for; None for "auto"."""
+    if controller is not None:
+        advice = "Take one of diffrax, such as diffrax.PIDController(rtol=1e-6, atol=1e-6), or None."
+        check_kind("simulate: stepsize_controller", controller, diffrax.AbstractStepSizeController, advice)
     if not isinstance(solver, str):
+        check_kind("simulate: solver", solver, diffrax.AbstractSolver, f"Or one of {', '.join(map(repr, SOLVERS))}.")
         return SolverChoice(solver, controller, max_step)
     check_one_of("solver", solver, SOLVERS)
     if controller is not None:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, final
 
 import equinox as eqx
 
-from jaxveh._core.errors import InputError, check_key, kind_of_inner
+from jaxveh._core.errors import InputError, check_key, kind_of_inner, word_for
 from jaxveh.numerics import apart
 from jaxveh.statespace.belief import AbstractBelief, Info
 from jaxveh.statespace.model import Row, StateSpace
@@ -205,6 +205,14 @@ def check_told(filter: Any, model: Any) -> None:
             raise InputError(
                 f"{name} = {type(value).__name__}: must be {example}. The order is filter, model, recording."
             )
+
+
+def check_model(who: str, model: Any) -> None:
+    """Raise `InputError` unless it is a `StateSpace`."""
+    if not isinstance(model, StateSpace):
+        raise InputError(
+            f"{who}: model = {word_for(model)}: must be a StateSpace, as returned by estimators.state_space."
+        )
 
 
 def layers(filter: Any) -> tuple[Any, ...]:

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh._core.bijectors import AbstractBijector
-from jaxveh._core.errors import InputError, did_you_mean, is_concrete
+from jaxveh._core.errors import InputError, check, check_kind, did_you_mean, is_concrete
 from jaxveh._core.names import as_mapping, record_type
 from jaxveh._core.parameter import Parameter, Where, check_shares, pick, prior_spread, put, resolve, share_of
 from jaxveh._core.parameters import Parameters
@@ -117,6 +117,7 @@ def with_parameters(
         raise InputError("with_parameters: this model estimates parameters already; choose them all in one `where`.")
     parameters = tuple(_of_system(p) for p in resolve(model, where))
     if domain is not None:
+        check_kind("domain", domain, AbstractBijector, "Take one of jaxveh.kit, such as Real() (called), or None.")
         parameters = tuple(p._replace(domain=domain) for p in parameters)
     values = pick(model.system, parameters)
     shaped = [p.name for p, value in zip(parameters, values, strict=True) if jnp.ndim(value) > 0]
@@ -160,6 +161,8 @@ def _of_system(p: Parameter) -> Parameter:
 def _walk(parameters, values, relative):
     """The walk's noise, or None; zero, or no entry in a mapping, means a constant."""
     check_shares("walk", parameters, relative)
+    if not isinstance(relative, Mapping):
+        check("walk", relative, lambda _: True, "a relative standard deviation, or a mapping from names to them")
     shares = [share_of(p, relative) if isinstance(relative, Mapping) else relative for p in parameters]
     still = [share is None or (is_concrete(share) and share == 0) for share in shares]
     walking = [

@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh._core.errors import check_kind
 from jaxveh._core.traced import trace_once
 from jaxveh.statespace.model import LinearInput
 
@@ -146,6 +147,9 @@ class Propagate(eqx.Module):
     derivatives: Callable = eqx.field(static=True)
     solver: diffrax.AbstractSolver = eqx.field(static=True, default=RK4())
     steps: int = eqx.field(static=True, default=1)
+
+    def __check_init__(self):
+        check_kind("solver", self.solver, diffrax.AbstractSolver, "Take one such as statespace.RK4() (called).")
 
     def __call__(self, system, t0, t1, x, u):
         term = diffrax.ODETerm(lambda t, y, args: trace_once(_rates, self.derivatives, system, t, y, args))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxveh import vehicles
-from jaxveh._core.errors import InputError, check_seed, check_whole
+from jaxveh._core.errors import InputError, check_seed, check_whole, path_of
 from jaxveh.io import kit, read_car
 from jaxveh.studies.axes import MOST, Varied, axes_of, sampled_paths
 from jaxveh.studies.settings import DEFAULTS, WHOLE, with_defaults
@@ -87,7 +87,7 @@ def read_study(path: str | os.PathLike) -> Study:
     **Raises** `InputError` naming the file and the unknown key or the value out of range, with the valid ones, before any
     run.
     """
-    path = Path(path)
+    path = path_of(path)
     try:
         told = kit.read_toml(path)
         kit.check_file(path, told, "study", (*WHOLE, *DEFAULTS))

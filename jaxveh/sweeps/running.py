@@ -12,8 +12,9 @@ import numpy as np
 from jax.sharding import Mesh
 from jax.sharding import PartitionSpec as P
 
-from jaxveh._core.errors import InputError, check_positive, check_whole
-from jaxveh._core.progress import Progress, silent
+from jaxveh._core.errors import InputError, check_callable, check_kind, check_positive, check_whole
+from jaxveh._core.names import as_pairs, as_several
+from jaxveh._core.progress import Progress, check_progress, silent
 from jaxveh.sweeps.design import Design
 from jaxveh.sweeps.given import Given
 from jaxveh.sweeps.lateness import warn_when_late
@@ -75,6 +76,13 @@ def sweep(
     and a store that was begun with something else or that another sweep is writing.
     **Warns** if a program may never end even on one device, with the remedy.
     """
+    check_callable("run", run, "Such as lambda point, key: ...")
+    check_kind("design", design, Design, "Such as sweeps.Design(noise=[0.01, 0.02]).")
+    check_progress(progress)
+    check_kind("note", note, str)
+    units = dict(as_pairs({} if units is None else units, "units"))
+    for name, unit in units.items():
+        check_kind(f"units of {name}", unit, str)
     if patience is not None:
         check_positive("patience", patience, "s")
     if store is not None or (client, processes, part) != (None, None, None):
@@ -83,11 +91,13 @@ def sweep(
                 "sweep: client=, processes= and part= need a store=; memory= and devices= are for sweeps without one."
             )
         asked = {"batch": batch, "client": client, "processes": processes, "part": part, "patience": patience}
-        asked |= {"units": units or {}, "note": note}
+        asked |= {"units": units, "note": note}
         return sweep_into(store, run, design, Given(design, seeds, key, data), progress=progress, **asked)
-    devices = jax.devices() if devices is None else list(devices)
+    devices = jax.devices() if devices is None else list(as_several(devices, "devices"))
+    for device in devices:
+        check_kind("devices", device, jax.Device, "Such as jax.devices()[:1].")
     found = _in_memory(run, design, Given(design, seeds, key, data), batch, memory, devices, patience, progress)
-    return dataclasses.replace(found, units=units or {}, note=note)
+    return dataclasses.replace(found, units=units, note=note)
 
 
 def _in_memory(run, design: Design, given: Given, batch, memory, devices, patience, progress) -> Swept:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_whole
+from jaxveh._core.errors import InputError, check_seed, check_whole
 
 
 class Samples(NamedTuple):
@@ -30,6 +30,7 @@ def latin_hypercube(count: int, *, seed: int = 0, **ranges: tuple[float, float])
     """
     from scipy.stats import qmc
 
+    check_seed("seed", seed)
     return _scaled(qmc.LatinHypercube(len(ranges) or 1, rng=seed), count, ranges)
 
 
@@ -39,6 +40,7 @@ def sobol(count: int, *, seed: int = 0, **ranges: tuple[float, float]) -> Sample
     from scipy.stats import qmc
 
     check_whole("count", count)
+    check_seed("seed", seed)
     if count & (count - 1):
         below = 1 << (int(count).bit_length() - 1)
         raise InputError(

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, path_of
 from jaxveh.io import kit
 from jaxveh.sweeps.design import Axis, Design
 from jaxveh.sweeps.plan import Chunk, Plan
@@ -44,7 +44,7 @@ class Store:
 
     def __init__(self, path: str | os.PathLike):
         zarr = kit.require("zarr", "storing a sweep", "sweep")
-        self.path = Path(path)
+        self.path = path_of(path)
         if not (self.path / "zarr.json").exists():
             there = " Take another name: the folder is of something else." if self.path.exists() else ""
             raise InputError(f"{self.path}: no such store: there is no zarr.json.{there}")

@@ -22,7 +22,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning, check_whole
+from jaxveh._core.errors import InputError, JaxvehWarning, check_whole, path_of
 from jaxveh._core.progress import Progress
 from jaxveh.io import kit
 from jaxveh.sweeps import identity
@@ -65,7 +65,7 @@ def sweep_into(
     check_whole("batch", BATCH if batch is None else batch)
     if client is not None and processes is not None:
         raise InputError("sweep: give client= or processes=, not both.")
-    path = Path(path)
+    path = path_of(path)
     with only_one(path, part) as is_mine:
         job = Job(run, design, str(path.resolve()))
         with _beginning(path):

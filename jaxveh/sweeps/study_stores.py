@@ -11,7 +11,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_whole
+from jaxveh._core.errors import InputError, check_whole, path_of
 from jaxveh._core.progress import Progress, silent
 from jaxveh.sweeps.design import Design
 from jaxveh.sweeps.running import sweep
@@ -37,6 +37,8 @@ class Stores:
     client: Any = None
 
     def __post_init__(self):
+        if self.folder is not None:
+            path_of(self.folder)
         if self.folder is None and (self.processes, self.client) != (None, None):
             raise InputError(
                 "stores: processes= and client= need a folder=; without a folder the sweeps run in this process."

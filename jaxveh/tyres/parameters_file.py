@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, path_of
 from jaxveh.io import kit, write_text
 from jaxveh.tyres.arctangent import Arctangent
 from jaxveh.tyres.base import AbstractTyre
@@ -72,7 +72,7 @@ def read_parameters(path: str | Path) -> AbstractTyre:
 
     **Raises** `InputError` for a file that is not TOML, an unknown model, or an unknown, missing or invalid parameter.
     """
-    path = Path(path)
+    path = path_of(path)
     content = kit.read_toml(path)
     kit.check_file(path, content, "tyre", ("tyre",))
     if "tyre" not in content:

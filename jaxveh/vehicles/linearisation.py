@@ -8,7 +8,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import check_has
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
 from jaxveh.vehicles.base import GRAVITY, AbstractVehicle
 from jaxveh.vehicles.linear_handling import LinearSingleTrack
@@ -34,9 +34,7 @@ def linear_single_track(car: Any, *, cg_height: Any = None) -> LinearSingleTrack
     if isinstance(car, LinearSingleTrack):
         return dataclasses.replace(car, cg_height=cg_height)
     needed = ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg", "front", "rear")
-    missing = [name for name in needed if not hasattr(car, name)]
-    if missing:
-        raise InputError(f"linear_single_track: {type(car).__name__} has no {', '.join(missing)}.")
+    check_has("linear_single_track: car", car, needed)
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     weight = car.mass * GRAVITY / (a + b)
     wheels = 2.0 if hasattr(car, "track_front") else 1.0

@@ -6,11 +6,17 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_has, check_kind, check_positive
 from jaxveh.tyres import AbstractTyre, Contact, Linear, MagicFormula, cornering_stiffness, kit
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.single_track import SingleTrack
 from jaxveh.vehicles.steering import steering_of
+
+FIELDS = (
+    *("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg", "front", "rear", "cg_height", "steer_offset"),
+    *("front_cornering_stiffness", "rear_cornering_stiffness"),
+)
+"""What a specification of a car has, for a single track."""
 
 
 def passenger_car() -> SingleTrack:
@@ -51,6 +57,8 @@ def axle_from_stiffness(stiffness, load) -> MagicFormula:
     The peak force D is the load (friction coefficient 1), C = 1.3 and E = -0.5 are those of an ordinary tyre, and
     `B = stiffness / (C D)`. The force scales with load (`nominal_load` is the static load).
     """
+    check_positive("stiffness", stiffness, "N/rad")
+    check_positive("load", load, "N")
     return kit.GENERIC_TYRE.magic_formula(stiffness, load)
 
 
@@ -59,6 +67,7 @@ def linear(car: SingleTrack) -> SingleTrack:
 
     The stiffness is the slope of each axle's force at zero slip angle, including shifts.
     """
+    check_kind("linear: car", car, SingleTrack, "Of other cars linear_single_track(car) makes one.")
     axles = [_linear_axle(tyre, load) for tyre, load in zip((car.front, car.rear), car.static_loads(), strict=True)]
     return eqx.tree_at(lambda c: (c.front, c.rear), car, axles)
 
@@ -84,6 +93,7 @@ def from_specification(spec) -> SingleTrack:
     **Raises** `InputError` for an axle that has neither coefficients nor a stiffness, and where `SingleTrack` and `MagicFormula`
     do.
     """
+    check_has("spec", spec, FIELDS, "io.read_car reads one from a file.")
     mass, a, b = spec.mass, spec.front_axle_to_cg, spec.rear_axle_to_cg
     static = {"front": mass * GRAVITY * b / (a + b), "rear": mass * GRAVITY * a / (a + b)}
     return SingleTrack(

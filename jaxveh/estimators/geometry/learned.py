@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import InputError, check_positive, path_of
 from jaxveh._core.version import VERSION
 from jaxveh.estimators.geometry.learner import UNITS, Learner
 from jaxveh.io import kit, write_text
@@ -102,7 +101,7 @@ def write_learned(learned: Learned, path: str | os.PathLike, *, overwrite: bool 
 def read_learned(path: str | os.PathLike) -> Learned:
     """Read a file of `write_learned`. **Raises** `InputError` with file and key if it is no such file, is incomplete, or has
     another unit."""
-    path = Path(path)
+    path = path_of(path)
     content = dict(kit.read_toml(path))
     try:
         kit.check_keys("the file", content, ("version", *UNITS))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import MISSING, fields
 from typing import Any, TypeVar
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_kind, word_for
 from jaxveh._core.names import check_names
 from jaxveh.vehicles.base import AbstractVehicle
 from jaxveh.vehicles.drive import AxleDrive, FourMotors
@@ -30,6 +30,9 @@ def build(numbers: CarNumbers, kind: type[V], **options: Any) -> V:
     **Raises** `InputError` with the parameters of the class that are missing from the numbers, and for options that are not
     parameters of the class.
     """
+    check_kind("numbers", numbers, CarNumbers, "Such as vehicles.sets.sedan() (called), or numbers_of(...).")
+    if not (isinstance(kind, type) and issubclass(kind, AbstractVehicle)):
+        raise InputError(f"kind = {word_for(kind)}: must be a class of vehicles, such as vehicles.SevenDOF.")
     entries = {entry.name: entry for entry in fields(kind)}
     check_names(f"build({numbers.name}, {kind.__name__})", options, entries)
     known = numbers.values(sprung="mass" not in entries)

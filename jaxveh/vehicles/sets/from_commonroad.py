@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_has, check_kind
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.limits import AccelerationLimits, SteerLimits
-from jaxveh.vehicles.sets.numbers import CarNumbers, SuspensionNumbers, TyreNumbers, named_alike
+from jaxveh.vehicles.sets.numbers import NAMED_ALIKE, CarNumbers, SuspensionNumbers, TyreNumbers, named_alike
+
+READ = "io.read_commonroad reads one from a file."
+"""What makes a specification."""
 
 
 def from_commonroad(specification: Any, name: str = "CommonRoad vehicle", source: str = "CommonRoad") -> CarNumbers:
@@ -20,6 +23,9 @@ def from_commonroad(specification: Any, name: str = "CommonRoad vehicle", source
     with a trailer), only kinematic cars can be built.
     """
     s = specification
+    check_kind("name", name, str)
+    check_kind("source", source, str)
+    check_has("specification", s, ("tyre", "trailer_wheelbase", *NAMED_ALIKE), READ)
     weight = None if s.mass is None else 0.5 * s.mass * GRAVITY / (s.front_axle_to_cg + s.rear_axle_to_cg)
     tyres = {"front": None, "rear": None}
     if s.tyre is not None and weight is not None:
@@ -44,6 +50,7 @@ def commonroad_limits(specification: Any) -> tuple[SteerLimits, AccelerationLimi
     """
     steering = ("steer_min", "steer_max", "steer_rate_min", "steer_rate_max")
     driving = ("acceleration_max", "switching_speed", "speed_min", "speed_max")
+    check_has("specification", specification, (*steering, *driving), READ)
     missing = [name for name in (*steering, *driving) if getattr(specification, name) is None]
     if missing:
         raise InputError(f"limits of the vehicle: {', '.join(missing)} missing from the specification.")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from jaxveh._core.errors import check_has
 from jaxveh.io import kit
 from jaxveh.vehicles.base import AbstractVehicle
 from jaxveh.vehicles.fourteen_dof import FourteenDOF
@@ -17,7 +18,7 @@ from jaxveh.vehicles.roll_3dof import Roll3DOF
 from jaxveh.vehicles.roll_4dof import Roll4DOF
 from jaxveh.vehicles.sets import commonroad_cars, heavy_cars, passenger_cars, race_cars
 from jaxveh.vehicles.sets.build import build
-from jaxveh.vehicles.sets.numbers import CarNumbers
+from jaxveh.vehicles.sets.numbers import NAMED_ALIKE, CarNumbers
 from jaxveh.vehicles.sets.specification import numbers_of
 from jaxveh.vehicles.seven_dof import SevenDOF
 from jaxveh.vehicles.single_track import SingleTrack
@@ -73,6 +74,7 @@ def specified_car(specification: Any, fidelity: str = "single-track") -> Abstrac
     **Raises** `InputError` for an unknown fidelity, and if the vehicle needs numbers that are missing from the file.
     """
     kit.check_known("vehicles", "fidelity", fidelity, FIDELITIES)
+    check_has("specification", specification, NAMED_ALIKE, "io.read_car reads one from a file.")
     if fidelity == "single-track":
         return from_specification(specification)
     return build(numbers_of(specification), FIDELITIES[fidelity])

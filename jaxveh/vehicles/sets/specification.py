@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from jaxveh._core.errors import InputError, word_for
+from jaxveh._core.errors import InputError, check_has, word_for
 from jaxveh._core.plain import plain_float
 from jaxveh.io import AxleTyre, CarSpecification
 from jaxveh.vehicles.base import GRAVITY
@@ -25,6 +25,7 @@ def numbers_of(specification: Any) -> CarNumbers:
     **Raises** `InputError` for an axle with neither coefficients nor a cornering stiffness.
     """
     s = specification
+    check_has("specification", s, NAMED_ALIKE, "io.read_car reads one from a file.")
     weight = s.mass * GRAVITY / (s.front_axle_to_cg + s.rear_axle_to_cg)
     return CarNumbers(
         name=s.name or "car",
