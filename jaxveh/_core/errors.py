@@ -89,9 +89,12 @@ def check_callable(name: str, value, advice: str = "") -> None:
 
 def check_has(name: str, value, fields: Iterable[str], advice: str = "") -> None:
     """Raise `InputError` unless `value` is an object with these fields; `advice` says what makes one."""
+    fields = tuple(fields)
     missing = [field for field in fields if isinstance(value, type) or not hasattr(value, field)]
     if missing:
-        told = f"{name} = {word_for(value)}: has no {', '.join(missing)}."
+        told = (
+            f"{name} = {word_for(value)}: must be an object with {', '.join(fields)}; it has no {', '.join(missing)}."
+        )
         raise InputError(told + (f" {advice}" if advice else ""))
 
 

@@ -136,10 +136,7 @@ def fit_rig(
     forces, too few rows, rows in which no slip varies, bad `folds` or `max_steps`;
     `FilterError` if the joint fit does not converge, unless `throw=False`.
     """
-    check_at_least("max_steps", max_steps, 1)
-    check_at_least("tolerance", tolerance, 0)
-    check_progress(progress)
-    check_whole("folds", folds, 0)
+    _check_settings(max_steps, tolerance, folds, progress)
     data, plan, aside = _prepare(law, rig, where, free, prior, measured, weights, bounds, robust, max_steps, tolerance)
     parts = fold_of(rig, folds) if folds else np.full(rig.load.shape, -1)
     joint = _joint(data)
@@ -160,6 +157,13 @@ def fit_rig(
         steps = reports[-1].steps
         raise FilterError(f"fit to {rig.source} stopped after {steps} steps; throw=False returns the unfinished fit.")
     return _result(data, tyre, joint, settled.held, tuple(reports), data.rmse(law), validation)
+
+
+def _check_settings(max_steps: int, tolerance: float, folds: int, progress: Progress) -> None:
+    check_at_least("max_steps", max_steps, 1)
+    check_at_least("tolerance", tolerance, 0)
+    check_whole("folds", folds, 0)
+    check_progress(progress)
 
 
 def _check_free(free: Sequence[str], plan: list[Stage]) -> None:

@@ -76,15 +76,8 @@ def sweep(
     and a store that was begun with something else or that another sweep is writing.
     **Warns** if a program may never end even on one device, with the remedy.
     """
-    check_callable("run", run, "Such as lambda point, key: ...")
-    check_kind("design", design, Design, "Such as sweeps.Design(noise=[0.01, 0.02]).")
-    check_progress(progress)
-    check_kind("note", note, str)
     units = dict(as_pairs({} if units is None else units, "units"))
-    for name, unit in units.items():
-        check_kind(f"units of {name}", unit, str)
-    if patience is not None:
-        check_positive("patience", patience, "s")
+    _check_kinds(run, design, patience, progress, units, note)
     if store is not None or (client, processes, part) != (None, None, None):
         if store is None or (memory, devices) != (None, None):
             raise InputError(
@@ -93,11 +86,28 @@ def sweep(
         asked = {"batch": batch, "client": client, "processes": processes, "part": part, "patience": patience}
         asked |= {"units": units, "note": note}
         return sweep_into(store, run, design, Given(design, seeds, key, data), progress=progress, **asked)
-    devices = jax.devices() if devices is None else list(as_several(devices, "devices"))
-    for device in devices:
-        check_kind("devices", device, jax.Device, "Such as jax.devices()[:1].")
+    devices = _devices(devices)
     found = _in_memory(run, design, Given(design, seeds, key, data), batch, memory, devices, patience, progress)
     return dataclasses.replace(found, units=units, note=note)
+
+
+def _check_kinds(run, design, patience, progress, units: dict[str, Any], note) -> None:
+    check_callable("run", run, "Such as lambda point, key: ...")
+    check_kind("design", design, Design, "Such as sweeps.Design(noise=[0.01, 0.02]).")
+    if patience is not None:
+        check_positive("patience", patience, "s")
+    check_progress(progress)
+    for name, unit in units.items():
+        check_kind(f"units of {name}", unit, str)
+    check_kind("note", note, str)
+
+
+def _devices(given: list | None) -> list:
+    """The given devices, or all."""
+    found = jax.devices() if given is None else list(as_several(given, "devices"))
+    for device in found:
+        check_kind("devices", device, jax.Device, "Such as jax.devices()[:1].")
+    return found
 
 
 def _in_memory(run, design: Design, given: Given, batch, memory, devices, patience, progress) -> Swept:

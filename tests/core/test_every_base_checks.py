@@ -67,6 +67,7 @@ CHECKS = {
 }  # fmt: skip
 MORE = {
     "check": (lambda v: v > 0, "positive"), "check_at_least": (1,), "check_one_of": ((1, 2),), "check_kind": (int,),
+    "check_has": (("mass",),),
 }  # fmt: skip
 
 

@@ -230,7 +230,10 @@ def test_a_tyre_with_states_counts_as_settled():
         (lambda: linear(cg_height=0.0), r"LinearSingleTrack\.cg_height = 0\.0"),
         (lambda: linear(crawl_speed=0.0), r"LinearSingleTrack\.crawl_speed = 0\.0"),
         (lambda: linear().system(0.0), r"speed = 0\.0: must be positive"),
-        (lambda: vehicles.linear_single_track(vehicles.Kinematic(2.7)), "car = Kinematic: has no mass, yaw_inertia"),
+        (
+            lambda: vehicles.linear_single_track(vehicles.Kinematic(2.7)),
+            "car = Kinematic: must be an object with .*; it has no mass, yaw_inertia",
+        ),
     ],
 )
 def test_bad_input_raises(make, message):
