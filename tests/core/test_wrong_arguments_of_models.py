@@ -8,7 +8,7 @@ import inspect
 import jax
 import numpy as np
 import pytest
-from families import WRONG, arguments_of, refuses
+from families import WRONG, arguments_of, members, refuses
 
 import jaxveh
 from jaxveh import (
@@ -65,7 +65,11 @@ RIGHT = {
 }  # fmt: skip
 """A right value by the argument's name."""
 
+METHOD = estimators.speed.METHODS["accelerometer"].make(FILE)
+
 OTHERWISE = {
+    "Exchange": {"methods": {"speed": METHOD}, "gives": {}}, "LiveMethod": {"method": METHOD},
+    "Live": {"cleaning": estimators.kit.AsItIs()},
     "simulate": {"manoeuvre": manoeuvres.step_steer(20.0, 0.02, start=0.1, duration=0.6), "dt": 0.1},
     "observe": {"model": CHOSEN}, "extended_state": {"model": BANKED, "u": AT, "leave": ("yaw",)},
     "contraction_rate": {"gain": GAIN, "leave": ("yaw",)},
@@ -98,7 +102,8 @@ SAID = {
 """What messages call an argument, if it is not the argument's name."""
 
 TAKEN = {
-    ("solve", "start"): WRONG, ("place_poles", "leave"): ("none",), ("contraction_rate", "leave"): ("none",),
+    ("solve", "start"): WRONG, ("Live", "key"): WRONG, ("Adaptive", "rate"): ("a mapping",),
+    ("place_poles", "leave"): ("none",), ("contraction_rate", "leave"): ("none",),
     ("extended_state", "leave"): ("none",), ("canonical", "fixed"): ("none", "text", "a mapping", "a list with text"),
     ("from_commonroad", "name"): ("text",), ("write_calibration", "path"): ("text",),
     ("from_commonroad", "source"): ("text",), ("fit_rig", "free"): ("none",), ("pose_rig", "free"): ("none",),
@@ -111,11 +116,16 @@ FORMULAS = {"regularised_speed", "slip_angle"}
 """Formulas of arrays, like those of `jax.numpy`, which speak for themselves."""
 
 ROOMS = (vehicles, observers, sweeps, fitting, estimators)
+CLASSES = {
+    (observers, name) for name in observers.__all__ if name in members("observers", observers.AbstractObserver)
+} | {(estimators, name) for name in ("Exchange", "Live", "LiveMethod")}
+"""Classes that users make of models; those of cars are looked at where all cars are."""
+
 CASES = [
     pytest.param(name, getattr(room, name), id=f"{room.__name__.split('.')[-1]}.{name}")
     for room in ROOMS
     for name in room.__all__
-    if inspect.isfunction(getattr(room, name)) and name not in FORMULAS
+    if (inspect.isfunction(getattr(room, name)) and name not in FORMULAS) or (room, name) in CLASSES
 ]
 
 
