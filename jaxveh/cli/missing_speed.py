@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
 
-from jaxveh import Recording, estimators
+from jaxveh import InputError, Recording, estimators
 from jaxveh.cli.console import results
 from jaxveh.io import CarSpecification
 
@@ -30,6 +33,16 @@ def with_speed(log: Path, recording: Recording, car: CarSpecification) -> Record
 def has_wheels(recording: Recording) -> bool:
     """Whether a log has wheel speeds."""
     return any(name.startswith("wheel_speed_") for name in recording.names)
+
+
+def wants_v_x(quantity: ModuleType, methods: Sequence[str], car: CarSpecification) -> bool:
+    """Whether one of these methods of a quantity uses `v_x`, and not the speed over ground itself."""
+    for name in methods:
+        with contextlib.suppress(InputError):
+            used = {need.channel for need in quantity.METHODS[name].make(car).needs}
+            if "v_x" in used and "speed" not in used:
+                return True
+    return False
 
 
 def _tell(log: Path, what: str) -> None:

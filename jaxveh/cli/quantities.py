@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
@@ -16,7 +15,7 @@ from jaxveh._core.recording import TRUTH
 from jaxveh.cli.blanking import fill_short, with_fill_option
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.drives import read_log
-from jaxveh.cli.missing_speed import has_wheels, with_speed
+from jaxveh.cli.missing_speed import has_wheels, wants_v_x, with_speed
 from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
 from jaxveh.cli.quantity_options import QUANTITIES, USUAL_FILTER, USUAL_PARTICLES
 from jaxveh.cli.vehicle import car_of
@@ -172,20 +171,10 @@ def _filled(asked: Asked, recording: Recording) -> Recording:
 def _logs(asked: Asked, log: Path, seen: Recording, car: CarSpecification) -> dict[str, Recording]:
     """Return the log that each quantity sees: with `v_x` from the wheels, except for the speed itself; from the speed over
     ground only for methods that do not use that, too, as a measurement of its own."""
-    wanting = {name for name in asked.what if name != SPEED and (has_wheels(seen) or _wants_v_x(asked, name, car))}
+    wants = lambda quantity: wants_v_x(quantity, asked.methods or (quantity.RECOMMENDED,), car)
+    wanting = {name for name in asked.what if name != SPEED and (has_wheels(seen) or wants(QUANTITIES[name]))}
     driven = _filled(asked, with_speed(log, seen, car)) if wanting else seen
     return {name: driven if name in wanting else seen for name in asked.what}
-
-
-def _wants_v_x(asked: Asked, quantity: str, car: CarSpecification) -> bool:
-    """Whether a chosen method of the quantity uses `v_x`, and not the speed over ground itself."""
-    module = QUANTITIES[quantity]
-    for name in asked.methods or (module.RECOMMENDED,):
-        with contextlib.suppress(InputError):
-            used = {need.channel for need in module.METHODS[name].make(car).needs}
-            if "v_x" in used and "speed" not in used:
-                return True
-    return False
 
 
 def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, seen: Recording, recording: Recording) -> Shown:
