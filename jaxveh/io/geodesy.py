@@ -1,4 +1,4 @@
-"""From latitude and longitude to metres east and north, as on a map of one drive."""
+"""From latitude and longitude to metres east and north, as on a map of one drive; directions that go on beyond a turn."""
 
 from __future__ import annotations
 
@@ -27,3 +27,11 @@ def east_and_north(latitude, longitude) -> tuple[np.ndarray, np.ndarray]:
     turn = np.remainder(longitude - longitude[first] + np.pi, 2.0 * np.pi) - np.pi
     east, north = along_parallel * turn, along_meridian * (latitude - latitude[first])
     return np.where(known, east, np.nan), np.where(known, north, np.nan)
+
+
+def without_turns(angles: np.ndarray) -> np.ndarray:
+    """Return angles (n,) without steps of a whole turn, also across missing ones."""
+    known = np.isfinite(angles)
+    found = np.full(angles.shape, np.nan)
+    found[known] = np.unwrap(angles[known])
+    return found

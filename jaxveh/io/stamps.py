@@ -69,6 +69,16 @@ def after_midnight(clock: np.ndarray) -> np.ndarray:
     return found
 
 
+def of_packed_clock(cells: Any) -> Any:
+    """Return times of day, HHMMSS.SS, as seconds, which go on after midnight; texts such as 10:05:03.1 as they are."""
+    if np.asarray(cells).dtype.kind not in "fiu":
+        return cells
+    hours, rest = np.divmod(np.asarray(cells, np.float64), 10_000.0)
+    minutes, seconds = np.divmod(rest, 100.0)
+    # The remainder of a number of six digits has lost six of its own.
+    return after_midnight(np.round(3600.0 * hours + 60.0 * minutes + seconds, 6))
+
+
 def _point(text: Any) -> str | None:
     """Return a date with a point before the fraction; None for an empty cell."""
     return text.strip().replace(",", ".") if isinstance(text, str) and text.strip() else None
