@@ -203,12 +203,14 @@ def float_array(value) -> Any:
     return value
 
 
-def real_array(name: str, value) -> Any:
-    """Return what may be a number, an array or a list of numbers as an array; raises `InputError` with the name for others.
-
-    NaN passes, as a missing value.
-    """
+def check_numbers(name: str, value) -> None:
+    """Raise `InputError` unless `value` is a real number, or an array or list of them. NaN passes, as a missing value."""
     check(name, value, lambda _: True, "or an array of them")
+
+
+def real_array(name: str, value) -> Any:
+    """Return what may be a number, an array or a list of numbers as an array of JAX; raises `InputError` for others."""
+    check_numbers(name, value)
     return jax.numpy.asarray(value, None if hasattr(value, "dtype") else jax.dtypes.canonicalize_dtype(float))
 
 

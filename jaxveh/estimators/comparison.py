@@ -10,7 +10,7 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_kind, check_one_of, real_array
+from jaxveh._core.errors import InputError, check_kind, check_numbers, check_one_of
 from jaxveh._core.names import as_names
 from jaxveh._core.recording import Recording, check_recording
 from jaxveh.diagnostics import Score, delay, score_band
@@ -85,8 +85,10 @@ def score_answers(found: Answers, name: str, truth: np.ndarray, which: np.ndarra
     check_kind("found", found, Answers, "compare(...).answers has one by each method's name.")
     check_one_of("name", name, found.mean._fields)
     mean, std, known = (np.asarray(getattr(part, name)) for part in (found.mean, found.std, found.known))
-    truth = np.asarray(real_array("truth", truth), float)
-    told = np.ones(mean.shape, bool) if which is None else np.asarray(real_array("which", which), bool)
+    check_numbers("truth", truth)
+    check_numbers("which", True if which is None else which)
+    truth = np.asarray(truth, float)
+    told = np.ones(mean.shape, bool) if which is None else np.asarray(which, bool)
     for what, array in (("truth", truth), ("which", told)):
         if array.shape != mean.shape:
             raise InputError(f"{what} has shape {array.shape}: must be {mean.shape}, one for each row.")

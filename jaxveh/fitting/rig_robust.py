@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import real_array
+from jaxveh._core.errors import check_numbers
 from jaxveh.fitting.rig_problem import KINK
 
 FAR_RESIDUAL = 4.0
@@ -39,7 +39,8 @@ def heavy_tails(residuals: np.ndarray) -> Tails | None:
 
     Heavy tails come from outliers, or from a law that fits some rows much worse than the others.
     """
-    residuals = np.asarray(real_array("residuals", residuals))
+    check_numbers("residuals", residuals)
+    residuals = np.asarray(residuals)
     known = residuals[np.isfinite(residuals)]
     deviation = TO_DEVIATION * float(np.median(np.abs(known))) if known.size else 0.0
     if deviation == 0:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_whole, real_array
+from jaxveh._core.errors import InputError, check, check_numbers, check_whole
 
 RESAMPLED = 2000
 """Bootstrap draws of the seeds."""
@@ -41,7 +41,9 @@ def compare(a: np.ndarray, b: np.ndarray, *, axis: int = -1, level: float = 0.95
     **Raises** `InputError` for different shapes, fewer than two seeds, or a negative value.
     """
     check("level", level, lambda p: (p > 0) & (p < 1), "above 0 and below 1")
-    a, b = (np.asarray(real_array(name, value), float) for name, value in (("a", a), ("b", b)))
+    check_numbers("a", a)
+    check_numbers("b", b)
+    a, b = np.asarray(a, float), np.asarray(b, float)
     check_whole("axis", axis, -a.ndim, most=a.ndim - 1)
     if a.shape != b.shape:
         raise InputError(f"a has shape {a.shape}, b {b.shape}: must be the same seeds and points.")

@@ -1,5 +1,6 @@
 """Paired comparisons: known ratios and wins, failures that count as losses, intervals that cover."""
 
+import jax
 import numpy as np
 import pytest
 
@@ -55,3 +56,9 @@ def test_intervals_cover_the_true_ratio_as_often_as_they_say():
 def test_mistakes_are_named(a, b, message):
     with pytest.raises(InputError, match=message):
         sweeps.compare(np.array(a), np.array(b))
+
+
+def test_the_digits_of_numpy_are_kept_without_x64():
+    with jax.enable_x64(False):
+        found = sweeps.compare(np.ones(5), np.full(5, 1.0 + 1e-9))
+    assert found.wins == 1.0
