@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_kind, check_positive
+from jaxveh._core.errors import InputError, check, check_positive, word_for
 from jaxveh._core.names import as_names, as_pairs, check_names, record
 from jaxveh.observers.base import observe
 from jaxveh.observers.chains import chained_gain
@@ -81,7 +81,8 @@ def linearised_step(model: StateSpace, dt: float, x: Any = None, u: Any = None) 
     dtype = jax.dtypes.canonicalize_dtype(float)
     model = cast(model, dtype)
     x = model.prior.mean if x is None else x
-    check_kind("x", x, type(model.prior.mean), "The default is the prior's mean, model.prior.mean.")
+    if getattr(x, "_fields", None) != model.states:
+        raise InputError(f"x = {word_for(x)}: must have the fields {', '.join(model.states)}, as model.prior.mean has.")
     given = dict(as_pairs({} if u is None else u, "u"))
     for name, value in (*x._asdict().items(), *given.items()):
         check(name, value, np.isfinite, "finite")

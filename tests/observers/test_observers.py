@@ -1,5 +1,7 @@
 """Observers on linear models: the poles that were asked for, switching, least squares against a batch, bad input."""
 
+from collections import namedtuple
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -46,6 +48,15 @@ def truth(rows=400, start=(1.0, -0.5, 0.3), stiffness=4.0):
     states = np.array(states)
     channels = {"place": states[:, 0], "speed": states[:, 1] + states[:, 2], "force": force}
     return system, states, Recording(DT * np.arange(rows), channels)
+
+
+def test_a_state_is_known_by_its_fields():
+    system, _, _ = truth()
+    own = namedtuple("Mine", system.states)(*system.prior.mean)
+    for a, b in zip(observers.linearised_step(system, DT, own), observers.linearised_step(system, DT), strict=True):
+        np.testing.assert_array_equal(a, b)
+    with pytest.raises(InputError, match="must have the fields place, speed"):
+        observers.linearised_step(system, DT, (0.0, 0.0, 0.0))
 
 
 def test_the_error_dies_out_with_the_poles_that_were_asked_for():
