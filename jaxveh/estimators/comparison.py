@@ -85,14 +85,13 @@ def score_answers(found: Answers, name: str, truth: np.ndarray, which: np.ndarra
     check_kind("found", found, Answers, "compare(...).answers has one by each method's name.")
     check_one_of("name", name, found.mean._fields)
     mean, std, known = (np.asarray(getattr(part, name)) for part in (found.mean, found.std, found.known))
-    check_numbers("truth", truth)
-    check_numbers("which", True if which is None else which)
+    which = np.ones(mean.shape, bool) if which is None else which
+    for what, array in (("truth", truth), ("which", which)):
+        check_numbers(what, array)
+        if np.shape(array) != mean.shape:
+            raise InputError(f"{what} has shape {np.shape(array)}: must be {mean.shape}, one for each row.")
     truth = np.asarray(truth, float)
-    told = np.ones(mean.shape, bool) if which is None else np.asarray(which, bool)
-    for what, array in (("truth", truth), ("which", told)):
-        if array.shape != mean.shape:
-            raise InputError(f"{what} has shape {array.shape}: must be {mean.shape}, one for each row.")
-    rows = np.isfinite(truth) & np.isfinite(mean) & told
+    rows = np.isfinite(truth) & np.isfinite(mean) & np.asarray(which, bool)
     claimed = None if np.isnan(std[rows]).all() else np.where(np.isnan(std), 0.0, std)
     score = score_band(truth, mean, claimed, rows)
     sure = rows & known
