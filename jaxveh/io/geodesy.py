@@ -12,7 +12,7 @@ def east_and_north(latitude, longitude) -> tuple[np.ndarray, np.ndarray]:
     """Return metres east and north, (n,) each, of the first place that is known; NaN where one is not.
 
     `latitude`, `longitude`: (n,), rad, positive to the north and to the east. Metres are those along the ellipsoid of WGS 84 in
-    its curvatures at the first place: 20 km away they are off by some 30 m.
+    its curvatures at the first place: at 50 degrees of latitude they are off by up to 3 m 5 km away, and by 43 m 20 km away.
     """
     latitude, longitude = np.asarray(latitude, np.float64), np.asarray(longitude, np.float64)
     known = np.isfinite(latitude) & np.isfinite(longitude)

@@ -71,6 +71,7 @@ def vbo_head(path: Path, encoding: str) -> Head:
 
 
 def standard_name(column: str) -> str:
+    """Return the first of a standard column's names; of another column its own, in small letters and with `_` for `-`."""
     plain = column.casefold().replace("-", "_")
     return ALIASES.get(plain, plain)
 

@@ -18,8 +18,8 @@ from jaxveh.experiments.model_adaptive_pf.settings import Case, Study
 from jaxveh.sweeps import IN_MEMORY, Stores
 
 ALIKE = 8
-"""Runs at a time: a filter is one program in all races. So few of them are not written out (`statespace.kit`), so that compiling
-takes two thirds of the time: more than the runs, which take twice as long."""
+"""Runs at a time: a filter is one program in all races. Steps of so few runs are not written out: compiling takes two thirds of
+the time (9 instead of 15 s of a cubature filter), which saves more than the runs lose (3 instead of 1 s)."""
 
 
 class Raced(NamedTuple):
