@@ -5,11 +5,13 @@ from __future__ import annotations
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.log_delays import check_delays
 from jaxveh.diagnostics.log_findings import LogFinding, LogView
+from jaxveh.diagnostics.log_magnitudes import check_gravity, check_units
 from jaxveh.diagnostics.log_names import check_names
 from jaxveh.diagnostics.log_plausibility import check_plausibility
+from jaxveh.diagnostics.log_rates import check_rates
 from jaxveh.diagnostics.log_samples import check_samples
 from jaxveh.diagnostics.log_sampling import check_sampling
-from jaxveh.diagnostics.log_signs import check_signs, check_units, check_wheel_speeds
+from jaxveh.diagnostics.log_signs import check_signs, check_wheel_speeds
 from jaxveh.diagnostics.log_steering import check_steering
 from jaxveh.io import CarSpecification, kit, with_road_steer
 
@@ -18,8 +20,10 @@ CHECKS = (
     check_sampling,
     check_samples,
     check_units,
+    check_gravity,
     check_wheel_speeds,
     check_signs,
+    check_rates,
     check_delays,
     check_steering,
     check_plausibility,
@@ -35,7 +39,7 @@ def check_log(recording: Recording, *, car: CarSpecification | None = None) -> l
     from `steering_wheel` and the file's ratio.
 
     The checks are: names that only look like known ones; rates, jitter, gaps and missing samples; repeated, frozen and coarse
-    values and spikes; magnitudes; signs and units, from relations between channels; delays, by cross-correlation; steering scale
+    values and spikes; magnitudes; signs and units, from relations between channels and of angles with their rates; delays, by cross-correlation; steering scale
     and offset; grip and the car's numbers.
     They run on the host in NumPy, and change nothing. Simulated truth (`true.` channels) is not checked.
 

@@ -25,32 +25,6 @@ _LATERAL = {
     np.pi / 180 / 3.6: ("v_x and yaw_rate", "km/h and deg/s"),
 }
 _LONGITUDINAL = {1 / 3.6: ("v_x", "km/h"), 0.44704: ("v_x", "mph"), 1 / GRAVITY: ("a_x", "g")}
-_LIMITS = {
-    "steer": (1.2, "rad at the road wheels", "degrees, or the angle of the steering wheel"),
-    "yaw_rate": (4.0, "rad/s", "deg/s"),
-    "v_x": (120.0, "m/s", "km/h"),
-    "a_x": (60.0, "m/s^2", "another unit"),
-    "a_y": (60.0, "m/s^2", "another unit"),
-    "sideslip": (1.6, "rad", "degrees"),
-}
-
-
-def check_units(log: LogView) -> list[LogFinding]:
-    """Check for magnitudes that no car reaches in SI units (99.5 % quantile, so that spikes do not count)."""
-    findings = []
-    for name, (limit, unit, likely) in _LIMITS.items():
-        if not log.has(name):
-            continue
-        values = log.channels[name]
-        size = float(np.quantile(np.abs(values[np.isfinite(values)]), 0.995))
-        if size > limit:
-            message = (
-                f"reaches {size:.4g}: too much for {unit}; it looks like {likely}. Set the unit in the channel map."
-            )
-            findings.append(LogFinding("error", name, message, {"size": size, "limit": limit}))
-        else:
-            findings.append(LogFinding("ok", name, f"reaches {size:.4g} {unit}.", {"size": size, "limit": limit}))
-    return findings
 
 
 def check_wheel_speeds(log: LogView) -> list[LogFinding]:
