@@ -16,7 +16,7 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh.sweeps.design import Design
 from jaxveh.sweeps.running import sweep
 from jaxveh.sweeps.store import DONE, Store
-from jaxveh.sweeps.swept import Swept, named_leaves
+from jaxveh.sweeps.swept import Swept, arrays_of, named_leaves
 
 RUNS = 100
 """Default number of runs of a chunk. A run is a whole drive, or a filter over a drive that keeps rows: up to four
@@ -64,20 +64,26 @@ class Stores:
         batch: int | None = None,
         alike: int | None = None,
         devices: list | None = None,
+        score: Callable[[dict[str, Any], Any], Any] | None = None,
         progress: Progress = silent,
     ) -> Swept:
         """`sweeps.sweep`, in the store of this `name` if there are stores: finished chunks are read and not computed.
 
         Arguments are those of `sweeps.sweep`; `devices` are for a sweep without a store. Chunks of a store have `batch` or
         `RUNS` runs. `alike`: the number of runs at a time without a store. Sweeps of one function with as many are one program,
-        which is compiled once where programs are kept (as those of `jaxveh reproduce` are). The result is in memory: the tables
-        of a study read each value many times.
+        which is compiled once where programs are kept (as those of `jaxveh reproduce` are). `score(values, data)` makes the
+        values that are found from those of a run, by dotted name, and the run's data. Without a store it is a program of its
+        own, which sweeps of many runs with the same kinds of values share. The result is in memory: the tables of a study read
+        each value many times.
 
         **Raises** `InputError` as `sweeps.sweep` does, and if chunks have failed: the study needs all of them.
         """
         if self.folder is None:
             at_once = batch if alike is None else alike
-            return sweep(run, design, seeds, key, data=data, batch=at_once, devices=devices, progress=progress)
+            found = sweep(run, design, seeds, key, data=data, batch=at_once, devices=devices, progress=progress)
+            return found if score is None else _scored(found, score, data, at_once, devices)
+        if score is not None:
+            run = _with_score(run, score)
         path = Path(self.folder) / f"{name}.zarr"
         found = sweep(
             run, design, seeds, key, data=data, batch=RUNS if batch is None else batch, progress=progress,
@@ -117,6 +123,19 @@ class Stores:
         names, structure = named_leaves({"found": shapes}), jax.tree.structure(shapes)
         values = [jax.numpy.asarray(found.values[one]) for one in names]
         return _keyed(jax.tree.unflatten(structure, values), kinds_found)
+
+
+def _scored(found: Swept, score: Callable[..., Any], data: Any, batch: int | None, devices: list | None) -> Swept:
+    """The scores of a sweep's values, as a sweep of their own."""
+    if found.design.choices or data is None:
+        raise InputError("score: needs data, and a design of numbers alone: values of choices differ in shape.")
+    one = lambda point, given: score(*given)
+    return sweep(one, found.design, data=(dict(found.values), data), batch=batch, devices=devices)
+
+
+def _with_score(run: Callable[..., Any], score: Callable[..., Any]) -> Callable[..., Any]:
+    """The run whose values are scored with its data, its last argument."""
+    return lambda *given: score(arrays_of(run(*given)), given[-1])
 
 
 def _kinds(tree: Any) -> list[str]:

@@ -99,10 +99,10 @@ def _told_speed(
     """The speed that methods of other quantities are told: no car measures it, so it is our own causal estimate."""
     module = estimators.speed
     methods = [module.METHODS[module.RECOMMENDED].make(car) for car in cars]
-    said = lambda answer, drive: {"v_x": answer.mean.v_x}
-    run = _run(methods, said)
+    # The same program as that of the race.
+    run = _run(methods, functools.partial(_series, list(module.SHOWN)))
     data = _data(module, methods[0], drives)
-    return stores.sweep("speed", run, _design(), seeds, key, data=data, progress=progress).values["v_x"]
+    return stores.sweep("speed", run, _design(), seeds, key, data=data, progress=progress).values["mean.v_x"]
 
 
 def _design() -> sweeps.Design:
@@ -132,19 +132,20 @@ def race_methods(
         if lacking:
             left_out[quantity, name] = f"the drives have no {', '.join(lacking)}"
             continue
-        run = _run(methods, functools.partial(_score, module))
-        data = _data(module, methods[0], drives)
-        swept = stores.under(quantity).under(name).sweep("race", run, _design(), seeds, key, data=data, progress=told)
+        shown = [one for one in module.SHOWN if f"true.{one}" in drives]
+        swept = stores.under(quantity).under(name).sweep(
+            "race", _run(methods, functools.partial(_series, shown)), _design(), seeds, key, data=_data(module, methods[0], drives),
+            score=functools.partial(_score, shown), progress=told,
+        )  # fmt: skip
         for path, values in swept.values.items():
-            shown, metric = path.rsplit(".", 1)
-            found.setdefault((quantity, name, shown), {})[metric] = values
+            one, metric = path.rsplit(".", 1)
+            found.setdefault((quantity, name, one), {})[metric] = values
     return ChaptersRaced(drives, found, _nothing(drives), left_out)
 
 
 def _data(module: ModuleType, method: AbstractMethod, drives: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    wanted = {need.channel for need in method.needs} | {f"true.{name}" for name in module.SHOWN}
-    wanted |= {"car", "true.v_x", *LEANS}
-    return {name: drives[name] for name in sorted(wanted) if name in drives}
+    wanted = {need.channel for need in method.needs} | {f"true.{name}" for name in module.SHOWN} | {"car", "true.v_x"}
+    return {name: drives[name] for name in sorted(wanted) if name in drives} | {"held": np.asarray(held_rows(drives))}
 
 
 def _run(methods: list[AbstractMethod], conclude: Callable[[Any, dict], dict]):
@@ -165,15 +166,18 @@ def _run(methods: list[AbstractMethod], conclude: Callable[[Any, dict], dict]):
     return run
 
 
-def _score(module: ModuleType, said: Any, drive: dict) -> dict[str, Any]:
-    shown = [name for name in module.SHOWN if f"true.{name}" in drive]
-    held = held_rows(drive)
-    return {
-        name: metrics(
-            getattr(said.mean, name), getattr(said.std, name), getattr(said.known, name), drive[f"true.{name}"], held
-        )
-        for name in shown
-    }
+def _series(shown: list[str], said: Any, drive: dict) -> dict[str, Any]:
+    """What a method says of the quantities `shown`, in every row."""
+    del drive
+    return {part: {name: getattr(getattr(said, part), name) for name in shown} for part in ("mean", "std", "known")}
+
+
+def _score(shown: list[str], said: dict[str, Any], drive: dict) -> dict[str, Any]:
+    """The metrics of the quantities `shown`, of one drive."""
+    of = lambda part: jnp.stack([said[f"{part}.{name}"] for name in shown])
+    truth = jnp.stack([drive[f"true.{name}"] for name in shown])
+    found = jax.vmap(metrics, in_axes=(0, 0, 0, 0, None))(of("mean"), of("std"), of("known"), truth, drive["held"])
+    return {name: {metric: values[i] for metric, values in found.items()} for i, name in enumerate(shown)}
 
 
 STEP = 0.01
