@@ -1,6 +1,10 @@
 """The review chapter by chapter: its cars and scenarios, what a drive is scored by, the conclusions' ratios; whole in the full
 run."""
 
+import functools
+import re
+import types
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -149,3 +153,21 @@ def test_every_method_is_raced_on_drives_that_are_driven():
     }
     for table in (*chapters.chapter_tables(found), chapters.conclusion_table(found)):
         assert table.rows and all(len(row) == len(table.columns) for row in table.rows)
+
+
+def test_the_scores_of_methods_with_as_many_quantities_are_one_program(monkeypatch):
+    """Of any two methods, whatever channels they read."""
+    there = ["true.sideslip", "true.v_y", "true.v_x", "true.roll", "true.roll_rate", "true.bank", "true.friction"]
+    drives = {name: np.zeros((2, 3, 700)) for name in (*racing.channels_kept(), *there)} | {"car": np.zeros((2, 3), int)}
+    texts = {}
+    for shown in (["sideslip"], ["v_x"], ["bank"], ["friction"], ["sideslip", "v_y"], ["roll", "roll_rate"]):
+        module = types.SimpleNamespace(SHOWN=dict.fromkeys(shown, "-"))
+        data = jax.tree.map(lambda one: one[0, 0], racing._data(module, types.SimpleNamespace(needs=()), drives))
+        said = {f"{part}.{name}": data["true.v_x"] for part in ("mean", "std") for name in shown}
+        said |= {f"known.{name}": data["held"] for name in shown}
+        score = functools.partial(racing._score, shown)
+        texts[tuple(shown)] = jax.jit(score).lower(said, data).as_text()
+    programs = {}
+    for shown, text in texts.items():
+        programs.setdefault(len(shown), set()).add(re.sub(r'jax.result_info = "[^"]*"', "", text))
+    assert {count: len(some) for count, some in programs.items()} == {1: 1, 2: 1}

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import sweeps
+from jaxveh import InputError, sweeps
 from jaxveh._core.names import record
 from jaxveh.sweeps import IN_MEMORY, Design, Stores, study_stores
 from jaxveh.sweeps.store import Store
@@ -81,3 +81,29 @@ def test_a_sweep_has_what_it_has_in_memory(tmp_path, monkeypatch):
     assert sweeps.read_sweep(tmp_path / "part" / "x.zarr").design.axis("law").labels == ("sine", "7")
     Stores(tmp_path).sweep("own", run, design, COUNT, jax.random.key(0), batch=2)
     assert Store(tmp_path / "own.zarr").plan.block == (1, 2)
+
+
+@pytest.mark.parametrize("folder", [False, True])
+def test_a_score_of_values_and_data_is_what_a_run_would_return(folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(study_stores, "RUNS", 4)
+    design, data = Design(scale=[1.0, 2.0, 3.0]), {"x": np.random.default_rng(0).normal(size=(3, COUNT, 6))}
+    run = lambda point, drive: {"said": {"mean": point.scale * jnp.cumsum(drive["x"]), "std": drive["x"] ** 2}}
+    score = lambda said, drive: {"rmse": jnp.sqrt(jnp.mean((said["said.mean"] - drive["x"]) ** 2)), "std": said["said.std"]}
+    stores = Stores(tmp_path) if folder else IN_MEMORY
+    found = stores.sweep("scored", run, design, data=data, score=score)
+    whole = sweeps.sweep(lambda point, drive: score(sweeps.running.arrays_of(run(point, drive)), drive), design, data=data)
+    assert set(found.values) == {"rmse", "std"} and found["rmse"].shape == (3, COUNT)
+    for name in whole.values:
+        np.testing.assert_allclose(found[name], whole[name], rtol=1e-12)
+    if folder:
+        # Values in between are not stored.
+        assert set(sweeps.read_sweep(tmp_path / "scored.zarr").values) == {"rmse", "std"}
+
+
+def test_a_score_needs_data_and_numbers():
+    run, score = lambda point, key: {"x": jnp.zeros(3)}, lambda said, drive: said
+    with pytest.raises(InputError, match=r"score: needs data, and a design of numbers"):
+        IN_MEMORY.sweep("x", run, Design(scale=[1.0]), 2, jax.random.key(0), score=score)
+    choices = Design(law={"one": 1, "two": 2})
+    with pytest.raises(InputError, match=r"score: needs data, and a design of numbers"):
+        IN_MEMORY.sweep("x", lambda point, drive: {"x": drive}, choices, data=np.zeros((2, 3)), score=score)
