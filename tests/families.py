@@ -6,6 +6,8 @@ import re
 
 import diffrax
 import equinox as eqx
+import jax
+import numpy as np
 import pytest
 
 import jaxveh
@@ -100,3 +102,66 @@ def refuses_everywhere(value, seen, taken=()):
         for argument in asked:
             if argument.name not in taken:
                 refuses(made, given, argument, said="inside" if argument.name == "inner" else "")
+
+
+def arrays_among(made, given):
+    """The arguments of a function or class that are arrays or numbers of floating point, by name."""
+    asked = {one.name: given.get(one.name, one.default) for one in arguments_of(made)}
+    numbers = {name: value for name, value in asked.items() if isinstance(value, float) or eqx.is_inexact_array(value)}
+    return {name: np.asarray(value, float) for name, value in numbers.items()}
+
+
+def or_refused(make, name):
+    """What `make()` makes, or None if it refuses an argument by its name."""
+    try:
+        return make()
+    except jaxveh.InputError as refusal:
+        said = str(refusal)
+    assert name in said
+    return None
+
+
+def is_made_inside_jit(made, given):
+    """Assert that a function or class takes its arguments inside jit, each as a tracer among known ones, or refuses it by
+    name."""
+    jax.eval_shape(lambda x: (made(**given), x)[1], 1.0)
+    for name, value in arrays_among(made, given).items():
+        make = lambda traced, name=name: or_refused(lambda: made(**given | {name: traced}), name)
+        jax.eval_shape(lambda traced, make=make: (make(traced), traced)[1], value)
+
+
+def keeps_copies(made, given):
+    """Assert that a module made of arrays stays as it is when the caller writes into them."""
+    for name, value in arrays_among(made, given).items():
+        # Of an array at a multiple of 64 bytes jax shares the memory.
+        room = np.zeros(value.nbytes + 64, np.uint8)
+        start = -room.ctypes.data % 64
+        mine = room[start : start + value.nbytes].view(float).reshape(value.shape)
+        mine[...] = value
+        one = or_refused(lambda name=name, mine=mine: made(**given | {name: mine}), name)
+        leaves = [leaf for leaf in jax.tree.leaves(one) if isinstance(one, eqx.Module) and eqx.is_array(leaf)]
+        before = [np.array(leaf) for leaf in leaves]
+        mine[...] = 7.0
+        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(before, leaves, strict=True)), name
+
+
+def refuses_arrays_as_settings(made, given):
+    """Assert that the numbers that are static, parts of the program, are no arrays: jax compares them to find a compiled program,
+    which of an array fails at some later call, also of another module."""
+    static = {field.name for field in dataclasses.fields(made) if field.metadata.get("static")}
+    for name in static & set(given):
+        value = given[name]
+        if not isinstance(value, int | float) or isinstance(value, bool):
+            continue
+        for wrong in (np.asarray(value), jax.numpy.asarray(value)):
+            with pytest.raises(jaxveh.InputError, match=name):
+                made(**given | {name: wrong})
+        with pytest.raises(jaxveh.InputError, match=name):
+            jax.eval_shape(lambda traced, name=name: (made(**given | {name: traced}), traced)[1], value)
+
+
+def made_again(value, seen):
+    """Each class in a value, that is not yet in `seen`, with what it is called with to make the same once more."""
+    for one in modules_in(value, seen):
+        asked = [argument.name for argument in arguments_of(type(one))]
+        yield type(one), {name: getattr(one, name) for name in asked if hasattr(one, name)}

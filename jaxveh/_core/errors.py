@@ -46,7 +46,9 @@ def check(name: str, value, holds, allowed: str, advice: str = "") -> None:
         array = np.asarray(None)
     if array.dtype.kind in NOT_REAL:
         raise InputError(f"{name} = {value!r}: must be a real number, {allowed}." + (f" {advice}" if advice else ""))
-    if not np.all(holds(array)):
+    held = holds(array)
+    # Inside jit a limit may be traced where the value is not.
+    if is_concrete(held) and not np.all(held):
         shown = array.item() if array.ndim == 0 else array
         raise InputError(f"{name} = {shown}: must be {allowed}." + (f" {advice}" if advice else ""))
 
@@ -72,6 +74,14 @@ def check_single(**values) -> None:
         check(name, value, lambda _: True, "one number")
         if np.ndim(value):
             raise InputError(f"{name} has the shape {np.shape(value)}: must be one number.")
+
+
+def check_known(**values) -> None:
+    """Raise `InputError` unless each of the named values is one real number that is known outside of jit, no tracer."""
+    check_single(**values)
+    for name, value in values.items():
+        if not is_concrete(value):
+            raise InputError(f"{name} = {value!r}: must be one number that is known outside of jit, vmap and grad.")
 
 
 def check_kind(name: str, value, kind: Any, advice: str = "") -> None:
@@ -142,7 +152,7 @@ def check_seed(name: str, value) -> None:
 
 def check_one_of(name: str, value, allowed) -> None:
     """Raise `InputError` unless `value` is one of `allowed`; the message suggests the most similar one."""
-    if value not in tuple(allowed):
+    if not is_concrete(value) or value not in tuple(allowed):
         raise InputError(
             f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}.{did_you_mean([value], allowed)}"
         )
@@ -194,7 +204,9 @@ def float_array(value) -> Any:
             return jax.numpy.asarray(np.asarray(value, jax.dtypes.canonicalize_dtype(float)))
     if isinstance(value, (jax.Array, np.ndarray, np.generic)) and jax.numpy.issubdtype(value.dtype, np.floating):
         weak = getattr(value, "weak_type", False)
-        return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float if weak else value.dtype))
+        dtype = jax.dtypes.canonicalize_dtype(float if weak else value.dtype)
+        # Of NumPy's arrays a copy: jax would share the memory of some, and the caller may write into it later.
+        return jax.numpy.array(value, dtype) if isinstance(value, np.ndarray) else jax.numpy.asarray(value, dtype)
     if type(value) is int and abs(value) > LARGEST_SEED:
         # No integer type holds it, and perhaps no float type either.
         value = np.float64(value) if abs(value) < 10**300 else np.float64(np.inf)

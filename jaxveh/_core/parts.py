@@ -1,4 +1,5 @@
-"""What a module is made of: a field that is annotated as a module or a NamedTuple holds one of that kind."""
+"""What a module is made of: a field that is annotated as a module or a NamedTuple holds one of that kind, and one that is static
+holds no array."""
 
 from __future__ import annotations
 
@@ -8,6 +9,8 @@ import typing
 from typing import Any
 
 import equinox as eqx
+import jax
+import numpy as np
 
 from jaxveh._core.errors import InputError
 
@@ -22,6 +25,27 @@ def check_parts(module: eqx.Module) -> None:
         if not isinstance(value, kinds):
             wanted = " or ".join(_in_words(kind) for kind in kinds if kind is not type(None))
             raise InputError(f"{type(module).__name__}.{name} = {type(value).__name__}: must be {wanted}.")
+
+
+def check_settings(module: eqx.Module) -> None:
+    """Raise `InputError` if a static field holds an array, traced or not.
+
+    It is a part of the program: jax finds a compiled program by comparing it, which of an array fails at some later call, also
+    at one of another module that holds a number.
+    """
+    for name in _settings_of(type(module)):
+        value = getattr(module, name)
+        if any(isinstance(leaf, jax.Array | np.ndarray) for leaf in jax.tree.leaves(value)):
+            raise InputError(
+                f"{type(module).__name__}.{name} = {value!r}: must be of plain numbers, such as float(value), known outside of jit, "
+                "vmap and grad: it is a part of the compiled program."
+            )
+
+
+@functools.cache
+def _settings_of(kind: type) -> tuple[str, ...]:
+    """The names of the static fields."""
+    return tuple(field.name for field in dataclasses.fields(kind) if field.metadata.get("static"))
 
 
 def _in_words(kind: type) -> str:

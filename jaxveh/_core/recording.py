@@ -44,7 +44,10 @@ class Recording(Kept, eqx.Module):
     def __init__(self, time, channels: Mapping[str, object], units: Mapping[str, str] | None = None, source: str = ""):
         # Time stamps of a long log need float64 even if everything else runs in float32: they stay on the host.
         time = _numbers("time", time)
-        self.time = time if isinstance(time, jax.Array) else np.asarray(time, dtype=np.float64)
+        if isinstance(time, np.ndarray):
+            # It has been checked: `t = recording.time; t -= t[0]` would change the recording.
+            time.flags.writeable = False
+        self.time = time
         self.channels = {str(name): _float(str(name), values) for name, values in channels.items()}
         self.units = tuple(sorted((units or {}).items()))
         self.source = source
@@ -257,12 +260,20 @@ def _numbers(name: str, values):
 
 
 def _on_the_host(values) -> tuple[Any, str]:
-    """The values as an array, and the kind of its type, of Python's objects that of what they are; None becomes NaN."""
+    """The values as an array, and the kind of its type, of Python's objects that of what they are; None and what NumPy masks
+    become NaN.
+
+    The array is a copy: the caller may write into the original later, and jax would share the memory of some arrays.
+    """
+    if isinstance(values, np.ma.MaskedArray):
+        hidden = np.ma.getmaskarray(values)
+        values, kind = _on_the_host(values.data)
+        return (values if kind in NO_NUMBERS else np.where(hidden, np.nan, values)), kind
     try:
         values = np.asarray(values)
         kinds = {_kind_of(one) for one in values.flat} if values.dtype.kind == "O" else {values.dtype.kind}
         wrong = [kind for kind in NO_NUMBERS if kind in kinds]
-        return (values, wrong[0]) if wrong else (np.asarray(values, np.float64), "f")
+        return (values, wrong[0]) if wrong else (np.array(values, np.float64), "f")
     except (TypeError, ValueError):
         return values, "V"
 

@@ -13,6 +13,7 @@ from jax.ad_checkpoint import checkpoint_name
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, word_for
+from jaxveh._core.parts import check_settings
 from jaxveh._core.result import Result
 from jaxveh.numerics import derivative_alone
 from jaxveh.statespace import kit
@@ -64,6 +65,9 @@ class AbstractResampling(eqx.Module):
 
     keeps_ancestors: ClassVar[bool] = False
     reweights: ClassVar[bool] = False
+
+    def __check_init__(self):
+        check_settings(self)
 
     @abc.abstractmethod
     def resample(self, key, particles: Any, weights: Any, logs: Any, n: int, gradient: str) -> Resampled:

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
+from jaxveh._core.parts import check_settings
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.filter import check_gaussian, kind_of_law
 from jaxveh.filters.particle import log_prob
@@ -37,6 +38,9 @@ class AbstractLookahead(eqx.Module):
 
     # No postponed annotations in this file: they would turn this into a field.
     defensive: eqx.AbstractVar[float]
+
+    def __check_init__(self):
+        check_settings(self)
 
     @abc.abstractmethod
     def check(self, model: StateSpace) -> None:

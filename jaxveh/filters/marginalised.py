@@ -3,6 +3,7 @@ particle."""
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -11,12 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, is_concrete
+from jaxveh._core.errors import InputError
 from jaxveh._core.names import as_names, check_names, record
 from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, log_chosen, log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, measurements_of, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
-from jaxveh.filters.gaussian.linear import concrete_values
+from jaxveh.filters.gaussian.linear import known_of
 from jaxveh.filters.gaussian.noises import covariance_in
 from jaxveh.filters.gaussian.rules import Image, product, times
 from jaxveh.filters.particle import (
@@ -286,10 +287,9 @@ def _as_state(filter_: Marginalised, model: StateSpace, z, x) -> Any:
 
 def _check_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
     """Raise `InputError` with the name of the first state or channel that is not linear in the states `linear`. Tracers pass."""
-    if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
+    found = known_of(lambda model: _nonlinear_in(linear, model), model)
+    if found is None:
         return
-    with concrete_values():
-        found = jax.tree.map(np.asarray, _nonlinear_in(linear, model))
     for what, names, nonlinear in zip(("state", "channel"), (model.states, model.channels), found, strict=True):
         if nonlinear.any():
             raise InputError(
@@ -313,7 +313,7 @@ def _nonlinear_in(linear: tuple[str, ...], model: StateSpace) -> list[Any]:
     found = []
     for names, f in ((model.states, move), (model.channels, see)):
         seen, slopes = _slopes(linear, point, lambda x, f=f, names=names: [getattr(f(x), n) for n in names])
-        step = jnp.stack([spread[name] * np.cos(1.0 + 2.0 * i) for i, name in enumerate(linear)])
+        step = jnp.stack([spread[name] * math.cos(1.0 + 2.0 * i) for i, name in enumerate(linear)])
         moved = point._replace(**{n: getattr(point, n) + step[i] for i, n in enumerate(linear)})
         there = jnp.stack([jnp.asarray(getattr(f(moved), n), dtype) for n in names])
         slope = times(slopes, step)

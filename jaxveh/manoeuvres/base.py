@@ -11,7 +11,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check, check_positive, is_concrete
+from jaxveh._core.errors import check, check_known, check_positive, is_concrete
 from jaxveh._core.parameter import parameter
 from jaxveh.numerics import smooth_step
 
@@ -97,8 +97,7 @@ def check_drive(speed, duration, steer=0.0) -> None:
     check_speed("speed", speed)
     check("steer", steer, _below_a_quarter_turn, "within a quarter turn", _advice(speed, steer))
     check_positive("duration", duration, "s")
-    if eqx.is_array(duration):
-        raise InputError("duration is an array: it must be a Python number, because it sets the number of rows.")
+    check_known(duration=duration)
 
 
 def _below_a_quarter_turn(angle) -> Any:

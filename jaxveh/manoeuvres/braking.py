@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import check, check_at_least, check_positive, check_single
+from jaxveh._core.errors import check, check_at_least, check_known, check_positive
 from jaxveh._core.parameter import parameter
 from jaxveh.manoeuvres.base import AbstractManoeuvre, PedalInputs, as_time, check_drive
 from jaxveh.numerics import smooth_ramp, smooth_step
@@ -66,7 +66,7 @@ def braking_in_a_turn(
     **Raises** `InputError` for values out of range, or a brake that is not fully applied within the duration.
     """
     check_drive(speed, duration, steer)
-    check_single(ramp=ramp, start=start, brake_at=brake_at, brake_ramp=brake_ramp)
+    check_known(ramp=ramp, start=start, brake_at=brake_at, brake_ramp=brake_ramp)
     check_positive("deceleration", deceleration, "m/s^2")
     check_positive("mass", mass, "kg")
     check_positive("wheel_radius", wheel_radius, "m")
@@ -93,7 +93,7 @@ def mu_jump_braking(
 
     Arguments and errors are those of `braking_in_a_turn`; the steer is zero.
     """
-    check_single(brake_at=brake_at)
+    check_known(brake_at=brake_at)
     check_positive("brake_at", brake_at, "s")
     return braking_in_a_turn(
         speed, 0.0, deceleration, mass=mass, wheel_radius=wheel_radius, start=0.0, ramp=brake_at,

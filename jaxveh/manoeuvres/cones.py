@@ -11,8 +11,10 @@ import numpy as np
 
 from jaxveh._core.errors import (
     InputError,
+    check,
     check_finite,
     check_kind,
+    check_known,
     check_positive,
     check_single,
     check_whole,
@@ -61,6 +63,7 @@ def iso_3888_1(width: float, start: float = 30.0) -> Course:
 
     **Raises** `InputError` for a width that is not positive.
     """
+    check_known(width=width)
     _check(width, start)
     first, second, third = 1.1 * width + 0.25, 1.2 * width + 0.25, 1.3 * width + 0.25
     right = -first / 2
@@ -85,6 +88,7 @@ def iso_3888_2(width: float, start: float = 30.0) -> Course:
 
     **Raises** `InputError` for a width that is not positive.
     """
+    check_known(width=width)
     _check(width, start)
     first, second, third = 1.1 * width + 0.25, width + 1.0, max(1.3 * width + 0.25, 3.0)
     left = first / 2
@@ -137,10 +141,8 @@ def centre_line(course: Course, lead: float) -> LaneChanges:
     if len(course.lanes) != 3:
         raise InputError(f"course = {course.name}: {len(course.lanes)} lanes; must have 3.")
     first, second, third = course.lanes
-    if not 0 <= 2 * lead <= second.end - second.start:
-        raise InputError(
-            f"lead = {lead}: must be between 0 and half the length of the second lane, {(second.end - second.start) / 2} m."
-        )
+    most = (second.end - second.start) / 2
+    check("lead", lead, lambda v: (v >= 0) & (v <= most), f"between 0 and half the length of the second lane, {most} m")
     return LaneChanges(
         over=second.centre - first.centre,
         back=third.centre - second.centre,
@@ -160,7 +162,7 @@ def cones(course: Course, spacing: float = 3.0, diameter: float = CONE_DIAMETER)
     **Raises** `InputError` for a spacing or diameter that is not positive.
     """
     _check_course(course)
-    check_single(spacing=spacing, diameter=diameter)
+    check_known(spacing=spacing, diameter=diameter)
     check_positive("spacing", spacing, "m")
     check_positive("diameter", diameter, "m")
     places = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from jaxveh._core.errors import InputError, check_positive, check_single, is_concrete
+from jaxveh._core.errors import InputError, check_known, check_positive, check_single, is_concrete
 from jaxveh.manoeuvres.base import check_drive, check_speed
 from jaxveh.manoeuvres.cones import centre_line, check_slalom, iso_3888_1, iso_3888_2
 from jaxveh.manoeuvres.path_driver import PathDriver
@@ -78,7 +78,7 @@ def steady_circle(
 
     **Raises** `InputError` for values out of range.
     """
-    check_single(time=time, start=start)
+    check_known(time=time, start=start)
     duration = start + time + 2.0 if duration is None else duration
     check_speed("from_speed", from_speed)
     check_speed("to_speed", to_speed)
@@ -89,8 +89,10 @@ def steady_circle(
 
 def _driver(path, speed, length: float, duration: float | None, driver: dict) -> PathDriver:
     if duration is None:
-        if not is_concrete(speed):
-            raise InputError("duration = None: it cannot be computed from a traced speed; give it in s.")
+        if not is_concrete(speed, length):
+            raise InputError(
+                "duration = None: it cannot be computed from a speed, start, spacing or count that is traced; give it in s."
+            )
         check_speed("speed", speed)
         check_single(speed=speed)
         check_positive("speed", speed, "m/s")

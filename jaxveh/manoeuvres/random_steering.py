@@ -7,7 +7,7 @@ from dataclasses import KW_ONLY
 import equinox as eqx
 import jax
 
-from jaxveh._core.errors import check, check_positive, check_single, check_whole
+from jaxveh._core.errors import check, check_known, check_positive, check_whole
 from jaxveh._core.parameter import parameter
 from jaxveh.manoeuvres.base import AbstractSteering, check_drive, window
 from jaxveh.numerics import band_harmonics, sum_of_harmonics
@@ -42,7 +42,7 @@ def random_steering(
     **Raises** `InputError` for values out of range.
     """
     check_drive(speed, duration, steer)
-    check_single(lowest=lowest, highest=highest, edge=edge)
+    check_known(lowest=lowest, highest=highest, edge=edge)
     check_positive("lowest", lowest, "Hz")
     check("highest", highest, lambda v: v > lowest, f"above lowest = {lowest:g} Hz")
     check_whole("count", count)

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import check, check_at_least, check_positive, check_single, check_whole
+from jaxveh._core.errors import check, check_at_least, check_known, check_positive, check_single, check_whole
 from jaxveh._core.parameter import check_parameters, parameter
 from jaxveh.manoeuvres.base import as_time, check_speed
 from jaxveh.numerics import gauss_markov_harmonics, smooth_ramp, sum_of_harmonics
@@ -64,7 +64,7 @@ class ChangingSpeed(AbstractSpeed):
     def __check_init__(self):
         check_speed("before", self.before)
         check_speed("after", self.after)
-        check_single(start=self.start, time=self.time, edge=self.edge)
+        check_known(start=self.start, time=self.time, edge=self.edge)
         check_positive("time", self.time, "s")
         check_positive("edge", self.edge, "s")
         check("edge", self.edge, lambda v: v <= self.time, f"at most time = {self.time:g} s")

@@ -12,7 +12,7 @@ import equinox as eqx
 import jax
 
 from jaxveh import numerics
-from jaxveh._core.errors import check, check_at_least, check_positive, check_single
+from jaxveh._core.errors import check, check_at_least, check_known, check_positive
 from jaxveh.manoeuvres.base import AbstractSteering, check_drive
 from jaxveh.numerics import smooth_ramp
 
@@ -93,7 +93,7 @@ def sine_with_dwell(
     **Raises** `InputError` for values out of range, or a sine that does not end within the duration.
     """
     check_drive(speed, duration, steer)
-    check_single(frequency=frequency, dwell=dwell, edge=edge, start=start)
+    check_known(frequency=frequency, dwell=dwell, edge=edge, start=start)
     check_positive("frequency", frequency, "Hz")
     check_positive("dwell", dwell, "s")
     _check_edge(edge, start, min(dwell, 0.25 / frequency))
@@ -116,7 +116,7 @@ def ramp_steer(
 
     **Raises** `InputError` for values out of range, or a ramp that does not end within the duration.
     """
-    check_single(rise=rise, edge=edge, start=start)
+    check_known(rise=rise, edge=edge, start=start)
     end = start + rise + edge / 2
     duration = end + 2.0 if duration is None else duration
     check_drive(speed, duration, steer)
@@ -140,7 +140,7 @@ def slalom(
 
     **Raises** `InputError` for values out of range, or periods that do not end within the duration.
     """
-    check_single(frequency=frequency, periods=periods, edge=edge, start=start)
+    check_known(frequency=frequency, periods=periods, edge=edge, start=start)
     check_positive("frequency", frequency, "Hz")
     check_positive("periods", periods)
     end = start + periods / frequency + edge / 2

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import check, check_at_least, check_positive, check_single
+from jaxveh._core.errors import check, check_at_least, check_known, check_positive
 from jaxveh.manoeuvres.base import AbstractSteering, check_drive, window
 from jaxveh.numerics import smooth_step
 
@@ -75,7 +75,7 @@ def double_lane_change(
     **Raises** `InputError` for values out of range, or where the two periods do not fit into the duration.
     """
     check_drive(speed, duration, steer)
-    check_single(start=start, pause=pause, period=period)
+    check_known(start=start, pause=pause, period=period)
     check_at_least("start", start, 0.0)
     check_at_least("pause", pause, 0.0)
     check_positive("period", period, "s")
@@ -93,7 +93,7 @@ def step_steer(speed, steer, *, ramp: float = 0.2, start: float = 1.0, duration:
     **Raises** `InputError` for values out of range, or where the ramp does not end within the duration.
     """
     check_drive(speed, duration, steer)
-    check_single(start=start, ramp=ramp)
+    check_known(start=start, ramp=ramp)
     check_at_least("start", start, 0.0)
     check_positive("ramp", ramp, "s", "A step without a ramp has no derivative; for a sharp one use 0.01 s.")
     check("duration", duration, lambda d: d >= start + ramp, f"at least start + ramp = {start + ramp:g} s")
@@ -116,7 +116,7 @@ def swept_sine(
     **Raises** `InputError` for values out of range, or edges that together are longer than the duration.
     """
     check_drive(speed, duration, steer)
-    check_single(from_frequency=from_frequency, to_frequency=to_frequency, edge=edge)
+    check_known(from_frequency=from_frequency, to_frequency=to_frequency, edge=edge)
     check_positive("from_frequency", from_frequency, "Hz")
     check_positive("to_frequency", to_frequency, "Hz")
     check_positive("edge", edge, "s")

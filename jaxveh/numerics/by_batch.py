@@ -56,6 +56,10 @@ def _batched(leaves, axes, *, single, many, out, least, most):
     size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
     leaves = [leaf if axis is None else jnp.moveaxis(leaf, axis, 0) for leaf, axis in zip(leaves, axes, strict=True)]
     along = [None if axis is None else 0 for axis in axes]
+    if size == 0:
+        # No number of further calls makes such a batch large enough.
+        found = jax.vmap(single, in_axes=along)(*leaves)
+        return found, [0] * len(found)
     if size >= least:
         return _in_blocks(leaves, along, size, many, most)
     one, more = jax.vmap(single, in_axes=along), lambda *some: _in_blocks(some, along, size, many, most)[0]

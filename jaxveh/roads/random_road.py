@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_positive, check_single, check_whole
+from jaxveh._core.errors import InputError, check, check_positive, check_single, check_whole, is_concrete
 from jaxveh._core.parameter import check_parameters, positive, table
 from jaxveh.numerics import band_harmonics, gauss_markov_harmonics, sum_of_harmonics
 from jaxveh.roads.base import AbstractRoad, Surface, place, surface
@@ -69,7 +69,8 @@ def band(std, longest: float, shortest: float, key: jax.Array, *, count: int = 1
     check_single(longest=longest, shortest=shortest)
     check_positive("std", std)
     check_positive("shortest", shortest, "m")
-    check("longest", longest, lambda v: v > shortest, f"above shortest = {shortest:g} m")
+    if is_concrete(shortest):
+        check("longest", longest, lambda v: v > shortest, f"above shortest = {shortest:g} m")
     check_whole("count", count)
     return Variation(std, *band_harmonics(key, 1.0 / longest, 1.0 / shortest, count))
 

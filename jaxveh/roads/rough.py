@@ -10,7 +10,16 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check, check_key, check_one_of, check_positive, check_single, check_whole
+from jaxveh._core.errors import (
+    InputError,
+    check,
+    check_key,
+    check_known,
+    check_one_of,
+    check_positive,
+    check_single,
+    check_whole,
+)
 from jaxveh._core.parameter import check_parameters, positive, table
 from jaxveh.roads.base import AbstractRoad, Surface, place, surface
 
@@ -81,7 +90,8 @@ def rough(
     if isinstance(roughness, str):
         check_one_of("roughness", roughness, tuple(ROUGHNESS))
         roughness = ROUGHNESS[roughness]
-    check_single(roughness=roughness, shortest=shortest, slant=slant)
+    check_single(roughness=roughness, slant=slant)
+    check_known(shortest=shortest)
     check_positive("roughness", roughness, "m^3")
     check("shortest", shortest, lambda v: (v > 0) & (v < LONGEST), f"above 0 and below {LONGEST:g} m")
     check_whole("count", count)

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, final
 import equinox as eqx
 
 from jaxveh._core.errors import InputError, check_key, kind_of_inner, word_for
+from jaxveh._core.parts import check_settings
 from jaxveh.numerics import apart
 from jaxveh.statespace.belief import AbstractBelief, Info
 from jaxveh.statespace.model import Row, StateSpace
@@ -78,6 +79,9 @@ class AbstractFilter(eqx.Module):
         for name in ("init", "step"):
             if name in vars(cls):
                 raise TypeError(f"{cls.__name__}.{name}: is final. Write _{name}, which it runs.")
+
+    def __check_init__(self):
+        check_settings(self)
 
     @property
     def gradients(self) -> Gradient:

@@ -7,8 +7,9 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from jaxveh._core.errors import InputError, check
+from jaxveh._core.errors import InputError, check, is_concrete
 from jaxveh._core.names import check_names, record, record_type
 from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.numerics import smooth_step
@@ -63,7 +64,10 @@ class AntiLock(AbstractVehicle):
                 "SevenDOF or a FourteenDOF."
             )
         check_parameters(self)
-        check("AntiLock.slip_high", self.slip_high, lambda v: v > self.slip_low, f"above slip_low = {self.slip_low}")
+        if is_concrete(self.slip_low):
+            # Of NumPy, so that they are known inside jit, too.
+            low = np.asarray(self.slip_low)
+            check("AntiLock.slip_high", self.slip_high, lambda v: v > low, f"above slip_low = {low}")
 
     @property
     def inputs(self):

@@ -139,6 +139,33 @@ def test_every_kind_of_real_number_is_taken():
         np.testing.assert_array_equal(recording["b"], [NAN, 1.0, 2.0])
 
 
+def test_what_numpy_masks_is_missing():
+    """Readers of files mask samples that are invalid; below the mask is whatever number."""
+    hidden = [False, True, False]
+    for kind in (float, np.float32, int, bool):
+        recording = Recording(np.arange(3.0), {"a": np.ma.masked_array(np.arange(3).astype(kind), hidden)})
+        np.testing.assert_array_equal(recording["a"], [0.0, NAN, 1.0 if kind is bool else 2.0])
+    assert not np.isnan(Recording(np.arange(3.0), {"a": np.ma.masked_array(np.arange(3))})["a"]).any()
+    with pytest.raises(InputError, match="time is not finite in row 1"):
+        Recording(np.ma.masked_array(np.arange(3.0), hidden), {})
+    with pytest.raises(InputError, match="a must be real numbers; it holds text"):
+        Recording(np.arange(3.0), {"a": np.ma.masked_array(["0", "1", "2"], hidden)})
+
+
+def test_later_changes_of_arrays_do_not_reach_a_recording():
+    """Of an array at a multiple of 64 bytes jax shares the memory, of others not."""
+    room = np.zeros(8 * 12, np.uint8)
+    for start in range(-room.ctypes.data % 8, 65, 8):
+        mine = room[start : start + 24].view(float)
+        mine[...] = [0.0, 1.0, 2.0]
+        recording = Recording(mine, {"a": mine})
+        mine += 5.0
+        np.testing.assert_array_equal(recording["a"], [0.0, 1.0, 2.0])
+        np.testing.assert_array_equal(recording.time, [0.0, 1.0, 2.0])
+    with pytest.raises(ValueError, match="read-only"):
+        recording.time[0] = 3.0
+
+
 def test_a_recording_passes_through_jit_and_vmap():
     recording = make(a=np.arange(4.0))
     doubled = jax.jit(lambda r: r.replace(a=2 * r["a"]))(recording)

@@ -2,7 +2,7 @@
 
 import pytest
 from copies import check_copies, unset_fields
-from families import left_out
+from families import is_made_inside_jit, keeps_copies, left_out, made_again, refuses_arrays_as_settings
 from test_every_dynamic_tyre import TYRES as DYNAMIC
 from test_every_tyre import LAWS
 
@@ -21,3 +21,19 @@ def test_it_equals_its_copies(name):
     value = ALL[name]()
     check_copies(value)
     assert not unset_fields(value)
+
+
+def parts():
+    """Each class of law, curve, ... in the tyres, once."""
+    seen = set()
+    for name, make in ALL.items():
+        for made, given in made_again(make(), seen):
+            yield pytest.param(made, given, id=f"{name}-{made.__name__}")
+
+
+@pytest.mark.filterwarnings("ignore:A JAX array is being set as static:UserWarning")
+@pytest.mark.parametrize(("made", "given"), list(parts()))
+def test_it_can_be_made_inside_jit_and_its_numbers_are_copied(made, given):
+    is_made_inside_jit(made, given)
+    keeps_copies(made, given)
+    refuses_arrays_as_settings(made, given)

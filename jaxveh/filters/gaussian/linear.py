@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -22,6 +24,21 @@ def concrete_values():
     return jax.ensure_compile_time_eval() if inside else contextlib.nullcontext()
 
 
+def known_of(look: Callable[[StateSpace], Any], model: StateSpace) -> Any:
+    """`look(model)` as NumPy arrays; None if it depends on traced values, inside functions of the model too.
+
+    `look` must not depend on the numbers of the noises: those that are traced are zeros in the model that it gets.
+    """
+    if not is_concrete(model.system, model.prior):
+        return None
+    hidden = lambda leaf: leaf if is_concrete(leaf) else np.zeros(leaf.shape, leaf.dtype)
+    noises = lambda model: (model.process_noise, model.measurement_noise)
+    shown = eqx.tree_at(noises, model, jax.tree.map(hidden, noises(model)), is_leaf=lambda one: one is None)
+    with concrete_values():
+        found = look(shown)
+    return jax.tree.map(np.asarray, found) if is_concrete(found) else None
+
+
 def check_linear(who: str, model: StateSpace) -> None:
     """Raise `InputError` with the name of the first state or channel that is not a linear function of the state.
 
@@ -29,12 +46,7 @@ def check_linear(who: str, model: StateSpace) -> None:
     values that are not finite are not compared. In a linear model the noise may depend on the inputs, but not on the
     state. Tracers pass.
     """
-    if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
-        return
-    with concrete_values():
-        found = jax.tree.map(np.asarray, _nonlinear_parts(model))
-        varies = isinstance(model.measurement_noise, StateDependent) and bool(_noise_varies(model))
-    for nonlinear in found:
+    for nonlinear in known_of(_nonlinear_parts, model) or ():
         for (what, names), values in zip(
             (("state", model.states), ("channel", model.channels)), nonlinear, strict=True
         ):
@@ -43,7 +55,8 @@ def check_linear(who: str, model: StateSpace) -> None:
                 raise InputError(
                     f"{who}: {what} {name} is not a linear function of the state. Use Extended or Unscented."
                 )
-    if varies:
+    depends = isinstance(model.measurement_noise, StateDependent) and is_concrete(model.measurement_noise)
+    if depends and known_of(_noise_varies, model):
         raise InputError(
             f"{who}: the measurement noise depends on the state. Use Extended, Unscented or a particle filter."
         )
