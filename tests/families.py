@@ -153,6 +153,7 @@ def refuses_arrays_as_settings(made, given):
         value = given[name]
         if not isinstance(value, int | float) or isinstance(value, bool):
             continue
+        made(**given | {name: np.asarray(value)[()]})
         for wrong in (np.asarray(value), jax.numpy.asarray(value)):
             with pytest.raises(jaxveh.InputError, match=name):
                 made(**given | {name: wrong})

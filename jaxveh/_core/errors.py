@@ -130,13 +130,17 @@ def kind_of_inner(value) -> str:
     )
 
 
+def is_whole(value) -> bool:
+    """Whether a value is an integer of Python or NumPy, and no truth value."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
+
+
 def check_whole(name: str, value, least: int = 1, advice: str = "", most: int | None = None) -> None:
     """Raise `InputError` unless `value` is a Python or NumPy integer of at least `least` and at most `most`.
 
     Floats and truth values are refused.
     """
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
-    if not whole or value < least or (most is not None and value > most):
+    if not is_whole(value) or value < least or (most is not None and value > most):
         allowed = f"of at least {least}" if most is None else f"from {least} to {most}"
         raise InputError(f"{name} = {value}: must be a whole number {allowed}." + (f" {advice}" if advice else ""))
 

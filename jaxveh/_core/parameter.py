@@ -15,7 +15,7 @@ import numpy as np
 from jaxveh._core.bijectors import AbstractBijector, Positive, Real
 from jaxveh._core.errors import InputError, check, check_finite, check_positive, did_you_mean, float_array
 from jaxveh._core.names import check_names
-from jaxveh._core.parts import check_parts, check_settings
+from jaxveh._core.parts import check_parts, check_static
 
 Where = Callable[..., object]
 """Picks array leaves, as in `equinox.tree_at`: `lambda car: (car.front.B, car.rear.B)`.
@@ -70,7 +70,7 @@ def check_parameters(module: eqx.Module) -> None:
     `__check_init__`; an option that is off (None, if that is its default) passes, and so do tracers.
     """
     check_parts(module)
-    check_settings(module)
+    check_static(module)
     for field in dataclasses.fields(module):
         value, domain = getattr(module, field.name), field.metadata.get("domain")
         if domain is None or (value is None and field.default is None):

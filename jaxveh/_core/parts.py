@@ -27,23 +27,23 @@ def check_parts(module: eqx.Module) -> None:
             raise InputError(f"{type(module).__name__}.{name} = {type(value).__name__}: must be {wanted}.")
 
 
-def check_settings(module: eqx.Module) -> None:
+def check_static(module: eqx.Module) -> None:
     """Raise `InputError` if a static field holds an array, traced or not.
 
     It is a part of the program: jax finds a compiled program by comparing it, which of an array fails at some later call, also
     at one of another module that holds a number.
     """
-    for name in _settings_of(type(module)):
+    for name in _static_fields(type(module)):
         value = getattr(module, name)
         if any(isinstance(leaf, jax.Array | np.ndarray) for leaf in jax.tree.leaves(value)):
             raise InputError(
-                f"{type(module).__name__}.{name} = {value!r}: must be of plain numbers, such as float(value), known outside of jit, "
-                "vmap and grad: it is a part of the compiled program."
+                f"{type(module).__name__}.{name} = {value!r}: must be of plain numbers, such as float(value), known outside of "
+                "jit, vmap and grad: it is a part of the compiled program."
             )
 
 
 @functools.cache
-def _settings_of(kind: type) -> tuple[str, ...]:
+def _static_fields(kind: type) -> tuple[str, ...]:
     """The names of the static fields."""
     return tuple(field.name for field in dataclasses.fields(kind) if field.metadata.get("static"))
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check
+from jaxveh._core.errors import InputError, check, is_whole
 from jaxveh.diagnostics.chi_squared import chi_squared_tails
 from jaxveh.diagnostics.innovations import whitened_innovations
 
@@ -63,7 +63,7 @@ def whiteness(estimate: Any, lags: int = 20, confidence: float = 0.95, skip: int
     check("confidence", confidence, lambda p: (p > 0) & (p < 1), "above 0 and below 1")
     white, here = whitened_innovations(estimate.info, skip)
     runs, rows, _ = white.shape
-    if not isinstance(lags, int) or not 1 <= lags < rows:
+    if not is_whole(lags) or not 1 <= lags < rows:
         raise InputError(f"lags = {lags}: must be a whole number from 1 to {rows - 1}, for {rows} rows.")
     count = here.sum(axis=(0, 1))
     scale = np.sqrt(np.sum(white**2, axis=(0, 1)) / np.maximum(count, 1))

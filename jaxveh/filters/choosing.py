@@ -13,7 +13,7 @@ from jax.ad_checkpoint import checkpoint_name
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, word_for
-from jaxveh._core.parts import check_settings
+from jaxveh._core.parts import check_static
 from jaxveh._core.result import Result
 from jaxveh.numerics import derivative_alone
 from jaxveh.statespace import kit
@@ -67,7 +67,7 @@ class AbstractResampling(eqx.Module):
     reweights: ClassVar[bool] = False
 
     def __check_init__(self):
-        check_settings(self)
+        check_static(self)
 
     @abc.abstractmethod
     def resample(self, key, particles: Any, weights: Any, logs: Any, n: int, gradient: str) -> Resampled:

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
-from jaxveh._core.parts import check_settings
+from jaxveh._core.parts import check_static
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.filter import check_gaussian, kind_of_law
 from jaxveh.filters.particle import log_prob
@@ -40,7 +40,7 @@ class AbstractLookahead(eqx.Module):
     defensive: eqx.AbstractVar[float]
 
     def __check_init__(self):
-        check_settings(self)
+        check_static(self)
 
     @abc.abstractmethod
     def check(self, model: StateSpace) -> None:

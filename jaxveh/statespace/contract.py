@@ -9,7 +9,7 @@ from typing import Any, ClassVar, final
 import equinox as eqx
 
 from jaxveh._core.errors import InputError, check_key, kind_of_inner, word_for
-from jaxveh._core.parts import check_settings
+from jaxveh._core.parts import check_static
 from jaxveh.numerics import apart
 from jaxveh.statespace.belief import AbstractBelief, Info
 from jaxveh.statespace.model import Row, StateSpace
@@ -81,7 +81,7 @@ class AbstractFilter(eqx.Module):
                 raise TypeError(f"{cls.__name__}.{name}: is final. Write _{name}, which it runs.")
 
     def __check_init__(self):
-        check_settings(self)
+        check_static(self)
 
     @property
     def gradients(self) -> Gradient:

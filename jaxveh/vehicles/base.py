@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter_table import WithParameters
-from jaxveh._core.parts import check_settings
+from jaxveh._core.parts import check_static
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.checked import with_checked_results
 
@@ -87,7 +87,7 @@ class AbstractVehicle(WithParameters, eqx.Module):
             cls.evaluate = with_checked_results(cls.evaluate)
 
     def __check_init__(self):
-        check_settings(self)
+        check_static(self)
 
     @property
     @abc.abstractmethod

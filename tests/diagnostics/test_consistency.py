@@ -139,7 +139,7 @@ def test_nees_of_all_rows_has_the_degrees_of_freedom_that_are_left():
 
 @pytest.mark.parametrize("whitened", [True, False])
 def test_whiteness_lets_white_innovations_pass_and_finds_colour(whitened):
-    found = diagnostics.whiteness(estimate(whitened=whitened), lags=10)
+    found = diagnostics.whiteness(estimate(whitened=whitened), lags=np.int64(10))
     assert found.white
     assert found.channels == ("a", "b")
     assert found.degrees_of_freedom == 40

@@ -222,6 +222,7 @@ def test_mistakes_are_named():
         InputError, match=r"bins = 7: must be a whole number of at least 2 that divides draws \+ 1 = 100"
     ):
         found.histogram(7)
+    assert found.histogram(np.int64(10)).x.tolist() == [10] * 10
     with pytest.raises(InputError, match=r"bins = 50: must be at most 20"):
         found.p_values(50)
     given = linear_recording(model, 4)

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_key, check_whole
+from jaxveh._core.errors import InputError, check, check_key, check_whole, is_whole
 from jaxveh._core.parameter import strong
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
@@ -33,7 +33,7 @@ class CalibrationRanks(NamedTuple):
 
         **Raises** `InputError` unless `bins` divides draws + 1.
         """
-        if not isinstance(bins, int) or bins < 2 or (self.draws + 1) % bins:
+        if not is_whole(bins) or bins < 2 or (self.draws + 1) % bins:
             raise InputError(
                 f"bins = {bins}: must be a whole number of at least 2 that divides draws + 1 = {self.draws + 1}."
             )

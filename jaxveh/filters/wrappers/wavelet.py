@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check, check_one_of, kind_of_inner
+from jaxveh._core.errors import InputError, check, check_one_of, is_whole, kind_of_inner
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.filters.particle import AbstractParticleFilter
 from jaxveh.filters.wrappers.base import (
@@ -136,7 +136,7 @@ class HaarParticles(AbstractHaar):
 def check_settings(settings: Any) -> None:
     """Raise `InputError` unless the settings are within their ranges."""
     who = type(settings).__name__
-    if not isinstance(settings.window, int) or settings.window < 4 or settings.window % 2:
+    if not is_whole(settings.window) or settings.window < 4 or settings.window % 2:
         raise InputError(f"{who}.window = {settings.window}: must be an even whole number of at least 4.")
     check(f"{who}.forgetting", settings.forgetting, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
     check(f"{who}.floor", settings.floor, lambda v: (v > 0) & (v <= 1), "above 0 and at most 1")
