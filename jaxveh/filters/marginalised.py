@@ -17,7 +17,7 @@ from jaxveh._core.names import as_names, check_names, record
 from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, log_chosen, log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, measurements_of, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
-from jaxveh.filters.gaussian.linear import known_of
+from jaxveh.filters.gaussian.known_numbers import look_inside_jit
 from jaxveh.filters.gaussian.noises import covariance_in
 from jaxveh.filters.gaussian.rules import Image, product, times
 from jaxveh.filters.particle import (
@@ -287,7 +287,7 @@ def _as_state(filter_: Marginalised, model: StateSpace, z, x) -> Any:
 
 def _check_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
     """Raise `InputError` with the name of the first state or channel that is not linear in the states `linear`. Tracers pass."""
-    found = known_of(lambda model: _nonlinear_in(linear, model), model)
+    found = look_inside_jit(lambda model: _nonlinear_in(linear, model), model)
     if found is None:
         return
     for what, names, nonlinear in zip(("state", "channel"), (model.states, model.channels), found, strict=True):

@@ -90,9 +90,7 @@ def steady_circle(
 def _driver(path, speed, length: float, duration: float | None, driver: dict) -> PathDriver:
     if duration is None:
         if not is_concrete(speed, length):
-            raise InputError(
-                "duration = None: it cannot be computed from a speed, start, spacing or count that is traced; give it in s."
-            )
+            raise InputError("duration = None: none follows from a traced speed, start or spacing; give it in s.")
         check_speed("speed", speed)
         check_single(speed=speed)
         check_positive("speed", speed, "m/s")

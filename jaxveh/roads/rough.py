@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import jax
@@ -10,16 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import (
-    InputError,
-    check,
-    check_key,
-    check_known,
-    check_one_of,
-    check_positive,
-    check_single,
-    check_whole,
-)
+from jaxveh._core.errors import InputError, check, check_key, check_one_of, check_positive, check_single, check_whole
 from jaxveh._core.parameter import check_parameters, positive, table
 from jaxveh.roads.base import AbstractRoad, Surface, place, surface
 
@@ -90,15 +80,14 @@ def rough(
     if isinstance(roughness, str):
         check_one_of("roughness", roughness, tuple(ROUGHNESS))
         roughness = ROUGHNESS[roughness]
-    check_single(roughness=roughness, slant=slant)
-    check_known(shortest=shortest)
+    check_single(roughness=roughness, shortest=shortest, slant=slant)
     check_positive("roughness", roughness, "m^3")
     check("shortest", shortest, lambda v: (v > 0) & (v < LONGEST), f"above 0 and below {LONGEST:g} m")
     check_whole("count", count)
     check("slant", slant, lambda v: v >= 0, "at least 0")
     check_key("rough", key)
     shares, turns, ways = jax.random.split(key, 3)
-    width = math.log(LONGEST / shortest) / count
+    width = jnp.log(LONGEST / shortest) / count
     shares = jax.random.uniform(shares, (count,))
     steps = (jnp.arange(count, dtype=shares.dtype) + shares) * width
     wavenumbers = jnp.exp(steps) / LONGEST

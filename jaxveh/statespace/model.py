@@ -276,7 +276,7 @@ def _channel(recording: Recording, name: str, dtype, is_input: bool):
 
 
 class LinearInput(eqx.Module):
-    """Inputs that run linearly from `u0` at `t0` to `u1` at `t1`."""
+    """Inputs that run linearly from `u0` at `t0` to `u1` at `t1`; over a step of zero length they are `u0`."""
 
     t0: Any
     t1: Any
@@ -285,7 +285,8 @@ class LinearInput(eqx.Module):
 
     def at(self, t):
         """The inputs at time t, the NamedTuple of scalars."""
-        share = (t - self.t0) / (self.t1 - self.t0)
+        length = self.t1 - self.t0
+        share = (t - self.t0) / jnp.where(length == 0, 1.0, length)
         return jax.tree.map(lambda a, b: a + share * (b - a), self.u0, self.u1)
 
 

@@ -11,6 +11,7 @@ import pytest
 from filter_systems import kalman
 from test_every_filter import FILTERS, KEYS, NAMES, batch, batch_of_values, batch_with_gradients, linear, names
 
+from jaxveh import estimators, sensors, vehicles
 from jaxveh import statespace as ss
 
 TWICE = ((3, 4), (12, 13), (13, 14))
@@ -73,6 +74,21 @@ def test_independent_process_noise(name):
     model = eqx.tree_at(lambda m: m.process_noise, model, ss.Continuous(ss.Gaussian(std)))
     found = batch_of_values(FILTERS[name].make(), model, rows, KEYS)
     check(name, rows, found, ss.MultivariateGaussian(NAMES, np.diag(np.square([*std.values()]))))
+
+
+@pytest.mark.parametrize("path", ["held", "linear"])
+def test_a_step_of_zero_length_moves_nothing_whatever_the_path_of_the_inputs(path):
+    """Two devices that report at one instant, in a live loop."""
+    model = estimators.state_space(vehicles.passenger_car(), sensors.esc(), input_path=path)
+    before, after = ({"steer": steer, "v_x": 20.0} for steer in (0.01, 0.02))
+    x, (u0, u1) = model.prior.mean, (model.row(1.0, u, {}).u for u in (before, after))
+    x = x._replace(v_y=jnp.asarray(0.1), yaw_rate=jnp.asarray(0.2))
+    move = lambda x, u0, u1: model.transition(1.0, 1.0, x, model.step_inputs(1.0, 1.0, u0, u1))
+    moved, back = jax.vjp(move, x, u0, u1)
+    np.testing.assert_array_equal(jnp.stack(moved), jnp.stack(x))
+    by_state, *by_inputs = back(jax.tree.map(jnp.ones_like, moved))
+    np.testing.assert_array_equal(jnp.stack(by_state), 1.0)
+    assert not any(np.any(leaf) for leaf in jax.tree.leaves(by_inputs))
 
 
 CORRELATED = ss.MultivariateGaussian(("a", "b"), np.array([[2.0, 0.5], [0.5, 1.0]]))

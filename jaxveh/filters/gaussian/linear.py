@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable
-from typing import Any
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -14,29 +10,8 @@ import numpy as np
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.names import record
 from jaxveh.filters.gaussian.belief import rows_of
+from jaxveh.filters.gaussian.known_numbers import look_inside_jit
 from jaxveh.statespace import StateDependent, StateSpace
-
-
-def concrete_values():
-    """A context in which a model of plain numbers has concrete values inside jit, too. Outside jit it does nothing:
-    there it would only compile constants one by one."""
-    inside = not is_concrete(jnp.zeros(()))
-    return jax.ensure_compile_time_eval() if inside else contextlib.nullcontext()
-
-
-def known_of(look: Callable[[StateSpace], Any], model: StateSpace) -> Any:
-    """`look(model)` as NumPy arrays; None if it depends on traced values, inside functions of the model too.
-
-    `look` must not depend on the numbers of the noises: those that are traced are zeros in the model that it gets.
-    """
-    if not is_concrete(model.system, model.prior):
-        return None
-    hidden = lambda leaf: leaf if is_concrete(leaf) else np.zeros(leaf.shape, leaf.dtype)
-    noises = lambda model: (model.process_noise, model.measurement_noise)
-    shown = eqx.tree_at(noises, model, jax.tree.map(hidden, noises(model)), is_leaf=lambda one: one is None)
-    with concrete_values():
-        found = look(shown)
-    return jax.tree.map(np.asarray, found) if is_concrete(found) else None
 
 
 def check_linear(who: str, model: StateSpace) -> None:
@@ -46,7 +21,7 @@ def check_linear(who: str, model: StateSpace) -> None:
     values that are not finite are not compared. In a linear model the noise may depend on the inputs, but not on the
     state. Tracers pass.
     """
-    for nonlinear in known_of(_nonlinear_parts, model) or ():
+    for nonlinear in look_inside_jit(_nonlinear_parts, model) or ():
         for (what, names), values in zip(
             (("state", model.states), ("channel", model.channels)), nonlinear, strict=True
         ):
@@ -56,7 +31,7 @@ def check_linear(who: str, model: StateSpace) -> None:
                     f"{who}: {what} {name} is not a linear function of the state. Use Extended or Unscented."
                 )
     depends = isinstance(model.measurement_noise, StateDependent) and is_concrete(model.measurement_noise)
-    if depends and known_of(_noise_varies, model):
+    if depends and look_inside_jit(_noise_varies, model):
         raise InputError(
             f"{who}: the measurement noise depends on the state. Use Extended, Unscented or a particle filter."
         )
