@@ -18,7 +18,7 @@ from jaxveh.cli.stores import Processes, Scheduler, check_workers
 if TYPE_CHECKING:
     from jaxveh.sweeps import Swept
 
-SUFFIX = ".zarr"
+SUFFIX, ZARR = ".zarr", "zarr.json"
 RUN = "run"
 
 STUDY = typer.Argument(metavar="STUDY.toml", help="The study: what to vary (jaxveh schema study).", show_default=False)
@@ -126,6 +126,9 @@ def _check(study: Path | None, store: Path | None) -> tuple[Path, Path]:
         )
     if store.suffix.lower() != SUFFIX:
         raise InputError(f"-o {store}: suffix {store.suffix!r}; it must end in {SUFFIX}.")
+    if store.exists() and not (store / ZARR).exists():
+        what = f"a folder without {ZARR}" if store.is_dir() else "a file"
+        raise InputError(f"-o {store}: is {what}, and no sweep's store; take another name, or remove it.")
     io.kit.require("zarr", "storing a sweep", "sweep")
     return study, store
 

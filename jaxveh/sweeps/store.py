@@ -39,15 +39,23 @@ SHOWN = 200
 """Characters of the error of a damaged store that are shown."""
 
 
+def check_begun(path: Path) -> None:
+    """Raise `InputError` if there is no store at a path: nothing, or something else."""
+    if (path / "zarr.json").exists():
+        return
+    if not path.exists():
+        raise InputError(f"{path}: no such store: there is no zarr.json.")
+    what = "a folder without zarr.json" if path.is_dir() else "a file"
+    raise InputError(f"{path}: is {what}, and no sweep's store; take another name, or remove it.")
+
+
 class Store:
     """A sweep's store at `path`, opened for reading and writing chunks."""
 
     def __init__(self, path: str | os.PathLike):
         zarr = kit.require("zarr", "storing a sweep", "sweep")
         self.path = path_of(path)
-        if not (self.path / "zarr.json").exists():
-            there = " Take another name: the folder is of something else." if self.path.exists() else ""
-            raise InputError(f"{self.path}: no such store: there is no zarr.json.{there}")
+        check_begun(self.path)
         with self._told_if_damaged("zarr.json"):
             self.group = zarr.open_group(self.path, mode="r+")
             told = self.group.attrs.get(MANIFEST)

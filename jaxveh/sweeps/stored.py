@@ -66,6 +66,8 @@ def sweep_into(
     if client is not None and processes is not None:
         raise InputError("sweep: give client= or processes=, not both.")
     path = path_of(path)
+    if path.exists():
+        Store(path)  # what is no sweep's is refused before locks are made beside it
     with only_one(path, part) as is_mine:
         job = Job(run, design, str(path.resolve()))
         with _beginning(path):

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import zarr
 from programs import error_line, run
 
 from jaxveh import studies, sweeps
@@ -155,6 +156,26 @@ def test_what_is_wrong_is_one_line(arguments, tmp_path, monkeypatch):
     (tmp_path / "wrong.toml").write_text(OWN.replace("step-steer", "step"))
     assert BAD[arguments] in error_line(run("sweep", *(arguments or ("run",))))
     assert not (tmp_path / "s.zarr").exists()
+
+
+TAKEN = {
+    "a folder without zarr.json": lambda path: (path.mkdir(), (path / "notes.txt").write_text("mine")),
+    "a file": lambda path: path.write_text("mine"),
+    "a Zarr store, but no sweep's": lambda path: zarr.open_group(path, mode="w"),
+}
+
+
+@pytest.mark.parametrize("what", TAKEN)
+def test_a_place_that_is_taken_by_something_else_is_refused_and_left_alone(what, tmp_path):
+    (tmp_path / "study.toml").write_text(STUDY.replace('["extended", "huber"]', '["extended"]'))
+    TAKEN[what](tmp_path / "s.zarr")
+    before = sorted(tmp_path.rglob("*"))
+    result = run("sweep", tmp_path / "study.toml", "-o", tmp_path / "s.zarr")
+    line = result.stderr.splitlines()[-1]
+    assert result.exit_code == 2, result.output
+    assert f"s.zarr: is {what}" in line or f"s.zarr: {what}" in line
+    assert what.startswith("a Zarr") or "compiling" not in result.stderr
+    assert sorted(tmp_path.rglob("*")) == before  # no lock either
 
 
 def test_a_wrapper_needs_what_it_wraps(tmp_path):

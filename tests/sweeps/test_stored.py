@@ -332,7 +332,7 @@ def test_without_a_store_there_is_no_client():
 
 def test_a_folder_of_somebody_elses_is_left_alone(tmp_path):
     (tmp_path / "mine").mkdir()
-    with pytest.raises(InputError, match="no such store: there is no zarr.json. Take another name"):
+    with pytest.raises(InputError, match="a folder without zarr.json, and no sweep's store; take another name"):
         stored_study.sweep(tmp_path / "mine")
     zarr.open_group(tmp_path / "other.zarr", mode="w")
     with pytest.raises(InputError, match="but no sweep's"):
