@@ -39,8 +39,8 @@ def check_log(recording: Recording, *, car: CarSpecification | None = None) -> l
     from `steering_wheel` and the file's ratio.
 
     The checks are: names that only look like known ones; rates, jitter, gaps and missing samples; repeated, frozen and coarse
-    values and spikes; magnitudes; signs and units, from relations between channels and of angles with their rates; delays, by cross-correlation; steering scale
-    and offset; grip and the car's numbers.
+    values and spikes; magnitudes; signs and units, from relations between channels and of angles with their rates; delays, by
+    cross-correlation; steering scale and offset; grip and the car's numbers.
     They run on the host in NumPy, and change nothing. Simulated truth (`true.` channels) is not checked.
 
     **Raises** `InputError` for a car whose rear wheels are steered, because the checks do not include their angles.

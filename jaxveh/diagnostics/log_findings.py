@@ -22,6 +22,10 @@ MOVING, WHEELBASE = 5.0, 2.7
 """Speed above which directions are compared (m/s), for a car of this wheelbase (m); it scales with the root of the wheelbase."""
 
 
+LAGGING = 2.0
+"""Time that the sideslip angle of a slow car, or a late compass, takes at most, s."""
+
+
 class LogFinding(NamedTuple):
     """One finding: its `severity` (of `SEVERITIES`), the `channel` concerned, a `message` in words, `values` by name."""
 
@@ -106,6 +110,13 @@ class LogView:
         if count >= values.size:
             return np.full_like(values, np.nan)
         return np.convolve(values, np.full(count, 1 / count), "same") * _inside(values.size, count // 2)
+
+    def is_slow(self, values: np.ndarray) -> bool:
+        """Whether averages of values (N,) over `LAGGING` seconds keep half of their deviation. In quicker motions the rate of the
+        sideslip angle and delays change slopes and signs of what agrees in slow ones."""
+        slow = self.smooth(values, LAGGING)
+        both = np.isfinite(values) & np.isfinite(slow)
+        return bool(both.any() and np.std(slow[both]) > 0.5 * np.std(values[both]))
 
 
 def _inside(size: int, edge: int) -> np.ndarray:

@@ -111,5 +111,7 @@ def _negative(name: str, values: np.ndarray) -> list[LogFinding]:
     if not low.any():
         return []
     what = "A speed with a sign is v_x." if name == "speed" else "Set those to NaN."
-    message = f"is negative in {low.sum()} of {low.size} samples, down to {values.min():.4g}, and is a magnitude. {what}"
+    message = (
+        f"is negative in {low.sum()} of {low.size} samples, down to {values.min():.4g}, and is a magnitude. {what}"
+    )
     return [LogFinding("warning", name, message, {"count": float(low.sum()), "least": float(values.min())})]

@@ -43,6 +43,8 @@ def _compare(log: LogView, name: str, rate: str) -> list[LogFinding]:
     story = f"changes by {slope:.3g} times {rate} (correlation {correlation:.2f})"
     if correlation < AGREE:
         return []
+    if name in OVER_GROUND and not log.is_slow(log.even(rate)):
+        return [LogFinding("note", name, f"{story}: its turns are too quick to tell of signs and units.", values)]
     if slope < 0:
         advice = _CLOCKWISE if rate == "yaw_rate" else "Set sign = -1 in the channel map."
         return [LogFinding("error", name, f"{story}: one of the two has the wrong sign. {advice}", values)]
@@ -52,8 +54,12 @@ def _compare(log: LogView, name: str, rate: str) -> list[LogFinding]:
         return []
     for factor, wrong in ((180 / np.pi, name), (np.pi / 180, rate)):
         if name != "z" and abs(np.log(slope / factor)) < np.log(1.25):
-            message = f"{story}: {wrong} looks like degrees{' per second' * (wrong == rate)}. Set it in the channel map."
+            message = (
+                f"{story}: {wrong} looks like degrees{' per second' * (wrong == rate)}. Set it in the channel map."
+            )
             return [LogFinding("error", wrong, message, values)]
+    if name == "course":
+        return [LogFinding("note", name, f"{story}: a car that slides, or a wrong unit or scale?", values)]
     return [LogFinding("warning", name, f"{story}, which should be 1: a wrong unit or scale?", values)]
 
 

@@ -35,7 +35,9 @@ def check_samples(log: LogView) -> list[LogFinding]:
         time, samples = log.time[present], values[present]
         if np.all(samples == samples[0]):
             why = ": the sensor does not work, or the manoeuvre does not excite it" if name in NEVER_STILL else ""
-            findings.append(LogFinding("note", name, f"is constant at {samples[0]:g}{why}.", {"value": float(samples[0])}))
+            findings.append(
+                LogFinding("note", name, f"is constant at {samples[0]:g}{why}.", {"value": float(samples[0])})
+            )
             continue
         coarse = _resolution(samples)
         still = _repeats(name, time, samples, coarse, _resting(log, time))

@@ -232,7 +232,8 @@ def fitted_car(
     """The car's file with the fitted values in place, as far as a car file can hold them.
 
     If the `recording` (or several) of the calibration is given and has `steer`, the front axle's stiffness and the steer offset
-    are fitted to it: see `front_axle`; otherwise they are the file's.
+    are fitted to it: see `front_axle`; otherwise they are the file's. **Warns** (`JaxvehWarning`) if they stay although a
+    recording is given.
     """
     fitted = source.model.system
     load = float(fitted.mass) * GRAVITY * float(fitted.front_axle_to_cg) / _wheelbase(source.model)
@@ -248,13 +249,12 @@ def fitted_car(
     recordings = [recording] if isinstance(recording, Recording) else recording
     recordings = [with_road_steer(car, one) for one in recordings]
     steered = [one for one in recordings if is_measured(one, "steer") and is_measured(one, "a_y")]
-    if not steered:
-        return found
-    told, new = car.front, front_axle(source.model, steered)
+    told, new = car.front, front_axle(source.model, steered) if steered else None
     if new is None:
-        warnings.warn(
-            "fitted_car: the front axle cannot be fitted to steer; the file's is kept.", JaxvehWarning, stacklevel=2
-        )
+        why = "the front axle cannot be fitted to steer" if steered else "no log has both steer and a_y"
+        if recordings:
+            kept = f"fitted_car: {why}; the file's front axle and steer_offset are kept."
+            warnings.warn(kept, JaxvehWarning, stacklevel=2)
         return found
     if told is not None:
         told = dataclasses.replace(told, B=told.B * new.front_cornering_stiffness / (told.B * told.C * told.D), S_h=0.0)

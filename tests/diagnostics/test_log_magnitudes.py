@@ -29,8 +29,6 @@ def test_every_known_channel_has_a_limit_or_is_known_to_have_none():
     assert set(UNSIGNED) <= set(LIMITS)
 
 
-
-
 @pytest.mark.parametrize("name", LIMITS)
 def test_twice_the_limit_is_found_and_a_tenth_is_not(name):
     wave = np.abs(np.sin(TIME)) + 1e-3 * np.sin(40 * TIME)

@@ -231,6 +231,13 @@ def test_a_steer_that_is_none_leaves_the_front_axle_as_told():
             calibration, test_sideslip.CAR, recording=log.replace(steer=-np.asarray(log["steer"]))
         )
     assert fitted.front_cornering_stiffness == test_sideslip.CAR.front_cornering_stiffness
+    # A log without steer leaves it, too, and says so; without a log nothing was asked for.
+    for unsteered in (log.without("steer"), [log.replace(steer=np.full(len(log), np.nan)), log.without("a_y")]):
+        with pytest.warns(JaxvehWarning, match="no log has both steer and a_y; the file's front axle and steer_offset"):
+            assert estimators.sideslip.fitted_car(calibration, test_sideslip.CAR, recording=unsteered) == fitted
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", JaxvehWarning)
+        assert estimators.sideslip.fitted_car(calibration, test_sideslip.CAR) == fitted
 
 
 def test_a_log_without_steer_is_scored_without_the_baseline():
