@@ -301,3 +301,15 @@ def _several(recording: Recording) -> str:
     """What to do with several drives in one, as `jax.vmap` returns them; "" for one."""
     one = " Take one of several, jax.tree.map(lambda leaf: leaf[0], recordings), or use jax.vmap over them."
     return one if np.ndim(recording.time) > 1 else ""
+
+
+def longest_gap(recording: Recording, name: str) -> float:
+    """Return the longest time without a sample of a channel, s: of rows between samples, or beyond the first or last one.
+
+    It is infinite without any sample, and 0 if there is one in every row.
+    """
+    time, known = np.asarray(recording.time), np.flatnonzero(np.isfinite(np.asarray(recording[name])))
+    if known.size == 0:
+        return float("inf")
+    inside = np.diff(time[known])[np.diff(known) > 1]
+    return float(max(inside.max(initial=0.0), time[known[0]] - time[0], time[-1] - time[known[-1]]))

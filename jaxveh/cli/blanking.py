@@ -11,6 +11,7 @@ import numpy as np
 from jaxveh import InputError, Recording
 from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
+from jaxveh._core.recording import longest_gap
 from jaxveh.diagnostics import kit
 from jaxveh.estimators import sideslip
 
@@ -42,8 +43,14 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
         recording = fill_short(recording, name, max_gap)
         gaps = np.isnan(np.asarray(recording[name]))
         if name in INPUTS and gaps.any():
+            if gaps.all():
+                raise InputError(
+                    f"input channel {name} has no value in any row: map another column with --channels (jaxveh schema channels)."
+                )
             first = np.asarray(recording.time)[np.argmax(gaps)]
-            advice = "add --fill SECONDS" if max_gap is None else "raise --fill, or take a span without the gap"
+            # Rounded up, so that it reaches.
+            needed = np.ceil(1e3 * longest_gap(recording, name) + 1e-3) / 1e3
+            advice = f"{'add' if max_gap is None else 'raise'} --fill {needed:g} to fill them, or take a --span without the gap"
             raise InputError(
                 f"input channel {name} is NaN in {int(gaps.sum())} rows, first at t = {first:g} s: inputs must be finite; "
                 f"{advice}."
@@ -68,7 +75,7 @@ def fill_short(recording: Recording, name: str, reach: float | None) -> Recordin
 
 def with_fill_option(reason: str) -> str:
     """The reason of a refusal, with the program's option that fills a gap instead of the library's function."""
-    return re.sub(r"Fill it with: recording\.fill\([^)]*\)\.", "Add --fill SECONDS, or raise it.", reason)
+    return re.sub(r"Fill it with: recording\.fill\([^)]*max_gap=([^)]*)\)\.", r"Fill it with --fill \1.", reason)
 
 
 class LogParts(NamedTuple):

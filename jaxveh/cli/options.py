@@ -89,8 +89,8 @@ Fill = Annotated[
     typer.Option(
         "--fill",
         metavar="SECONDS",
-        help="Fill gaps (NaN) in steer, v_x and a_x by linear interpolation, at the ends by the nearest sample, up to this "
-        "length; otherwise a gap is an error.",
+        help="Fill gaps (NaN) in inputs (steer, v_x, a_x, torques) by linear interpolation, at the ends by the nearest "
+        "sample, up to this length; otherwise a gap is an error.",
     ),
 ]
 

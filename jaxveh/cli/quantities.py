@@ -17,7 +17,7 @@ from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.drives import read_log
 from jaxveh.cli.missing_speed import has_wheels, wants_v_x, with_speed
 from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
-from jaxveh.cli.quantity_options import QUANTITIES, USUAL_FILTER, USUAL_PARTICLES
+from jaxveh.cli.quantity_options import QUANTITIES, USUAL_FILTER, USUAL_PARTICLES, inputs_of
 from jaxveh.cli.vehicle import car_of
 from jaxveh.estimators import Answers, Compared, MethodScore
 from jaxveh.io import CarSpecification
@@ -151,18 +151,18 @@ def _log(asked: Asked, log: Path, car: CarSpecification) -> tuple[Recording, Rec
     drive = read_log(log, car, asked.channels, asked.span, (asked.truth,), asked.anyway)
     recording = drive.recording
     if asked.truth is None:
-        return _filled(asked, recording), recording
+        return _filled(asked, recording, car), recording
     if asked.truth not in recording:
         raise InputError(
             f"--truth {asked.truth}: {log.name} has no such channel; it has: {', '.join(recording.names)}."
         )
     hidden = {asked.truth, *ALIKE.get(asked.truth.removeprefix(TRUTH), (asked.truth.removeprefix(TRUTH),))}
-    return _filled(asked, recording.without(*[name for name in recording.names if name in hidden])), recording
+    return _filled(asked, recording.without(*[name for name in recording.names if name in hidden]), car), recording
 
 
-def _filled(asked: Asked, recording: Recording) -> Recording:
+def _filled(asked: Asked, recording: Recording, car: CarSpecification) -> Recording:
     """Fill gaps in the inputs if `--fill` is given."""
-    for name in ("steer", "v_x", "a_x"):
+    for name in inputs_of(asked.what, asked.methods, car) if asked.fill else ():
         if name in recording:
             recording = fill_short(recording, name, asked.fill)
     return recording
@@ -173,7 +173,7 @@ def _logs(asked: Asked, log: Path, seen: Recording, car: CarSpecification) -> di
     ground only for methods that do not use that, too, as a measurement of its own."""
     wants = lambda quantity: wants_v_x(quantity, asked.methods or (quantity.RECOMMENDED,), car)
     wanting = {name for name in asked.what if name != SPEED and (has_wheels(seen) or wants(QUANTITIES[name]))}
-    driven = _filled(asked, with_speed(log, seen, car)) if wanting else seen
+    driven = _filled(asked, with_speed(log, seen, car), car) if wanting else seen
     return {name: driven if name in wanting else seen for name in asked.what}
 
 

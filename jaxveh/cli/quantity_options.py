@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Sequence
 from types import ModuleType
 from typing import Annotated
 
 import typer
 
-from jaxveh import estimators
+from jaxveh import InputError, estimators
 from jaxveh.cli.console import table
+from jaxveh.io import CarSpecification
 
 QUANTITIES: dict[str, ModuleType] = {
     name: getattr(estimators, name)
@@ -19,6 +22,20 @@ QUANTITIES: dict[str, ModuleType] = {
 
 USUAL_FILTER, USUAL_PARTICLES = "ekf", 1000
 """Defaults of the sideslip program; the methods of the other quantities choose their own filters."""
+
+FILLED = ("steer", "v_x", "a_x")
+"""Channels that `--fill` fills for every quantity; for a method also those that it needs in every row."""
+
+
+def inputs_of(what: Sequence[str], methods: Sequence[str] | None, car: CarSpecification) -> tuple[str, ...]:
+    """Return the channels that `--fill` fills for these methods of quantities; None for the recommended ones."""
+    found = set(FILLED)
+    for quantity in (QUANTITIES[name] for name in what):
+        for name in methods or (quantity.RECOMMENDED,):
+            with contextlib.suppress(InputError):  # a car without a method's numbers is told of by the method
+                found |= {need.channel for need in quantity.METHODS[name].make(car).needs if need.throughout}
+    return tuple(sorted(found))
+
 
 What = Annotated[
     str,

@@ -13,7 +13,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.io.channel_map import ChannelMap
 from jaxveh.io.decimals import is_number
 from jaxveh.io.stamps import is_stamp
-from jaxveh.io.units import is_unit, is_unit_name
+from jaxveh.io.units import is_unit, is_unit_name, without_brackets
 
 HEAD = 400
 """The number of lines among which the names and the first rows must be."""
@@ -82,7 +82,8 @@ def _layout(
     above = [line for line in lines[:names] if line.strip() and not line.startswith(COMMENT)]
     if len(above) > (said is not None) and not (told and told.names_line):
         remarks.append(f"the columns' names are in line {names + 1}; the lines above are not read")
-    by_name = {} if units is None else dict(zip(headings, _split(lines[units], separator), strict=False))
+    told_units = [] if units is None else map(without_brackets, _split(lines[units], separator))
+    by_name = dict(zip(headings, told_units, strict=False))
     decimal = (told.decimal if told else None) or _decimal(lines[first:], separator)
     return Layout(headings, by_name, first, separator, decimal, encoding, tuple(remarks))
 
@@ -217,7 +218,7 @@ def _are_words(cells: Sequence[str]) -> bool:
 
 def _are_units(cells: Sequence[str]) -> bool:
     """Whether cells are units: half of them are known, and one of them is that of a channel."""
-    told = [cell.strip("[]()") for cell in cells if cell]
+    told = [without_brackets(cell) for cell in cells if cell]
     known = [one for one in told if is_unit_name(one)]
     return bool(known) and 2 * (len(known) + sum(not is_unit(one) or one == "1" for one in told)) >= len(told)
 

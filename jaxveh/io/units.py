@@ -43,17 +43,25 @@ _LETTERS = ("s", "m", "g", "G", "N", "°", "%")
 _TIMES = ("s", "sec", "ms", "us", "µs", "ns")
 
 _GRAD = re.compile(r"grad\b", re.IGNORECASE)
+_BRACKETS = re.compile(r"[\[(<]([^][()<>]*)[])>]")
 _POWER = re.compile(r"(?<=[A-Za-z])-(?=\d)")
 
 
 def is_unit(unit: str | None) -> TypeGuard[str]:
     """Whether a unit is given: not empty, `-`, `n/a` and the like."""
-    return unit is not None and unit.strip().casefold() not in _NOT_GIVEN
+    return unit is not None and without_brackets(unit).casefold() not in _NOT_GIVEN
+
+
+def without_brackets(unit: str) -> str:
+    """The unit of a text such as `[km/h]`, as many loggers write units on a line of their own."""
+    said = unit.strip()
+    inside = _BRACKETS.fullmatch(said)
+    return said if inside is None else inside[1].strip()
 
 
 def same_unit(unit: str, other: str) -> bool:
     """Whether two units are the same, though written differently, such as `N m` and `N*m`."""
-    plain = lambda one: _ALIASES.get(one.strip(), one.strip())
+    plain = lambda one: _ALIASES.get(without_brackets(one), without_brackets(one))
     return plain(unit) == plain(other)
 
 
@@ -65,7 +73,7 @@ def convert(values, unit: str, target: str, what: str) -> np.ndarray:
 
     **Raises** `InputError` for an unknown unit, or a unit of another quantity.
     """
-    said = unit.strip()
+    said = without_brackets(unit)
     if said == target:
         return np.asarray(values)
     unit = _spelled(said, target)

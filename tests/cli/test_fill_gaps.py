@@ -1,10 +1,13 @@
 """`--fill`: gaps of any place and length in the inputs, drawn at random, against NumPy's interpolation."""
 
+import re
+
 import numpy as np
 import pytest
 
-from jaxveh import InputError, Recording
+from jaxveh import InputError, Recording, estimators
 from jaxveh.cli import blanking
+from jaxveh.cli.quantity_options import FILLED, QUANTITIES, inputs_of
 
 ROWS = 50
 TIME = 0.1 * np.arange(ROWS)
@@ -42,6 +45,62 @@ def test_short_gaps_are_filled_and_long_ones_told(seed):
 
 def test_without_the_option_a_gap_stays_an_error():
     missing = np.arange(ROWS) == ROWS - 1
-    with pytest.raises(InputError, match=r"v_x is NaN in 1 rows, first at t = 4\.9 s.*add --fill SECONDS"):
+    with pytest.raises(InputError, match=r"v_x is NaN in 1 rows, first at t = 4\.9 s.*add --fill 0\.101 to fill them"):
         blanking.fill_gaps(log_with(missing), None)
     assert np.isfinite(np.asarray(blanking.fill_gaps(log_with(missing), 0.2)["v_x"])).all()
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_length_that_the_message_names_is_enough(seed):
+    draw = np.random.default_rng(seed)
+    missing = np.zeros(ROWS, bool)
+    for _ in range(3):
+        begin = draw.integers(ROWS)
+        missing[begin : begin + draw.integers(1, 12)] = True
+    drive = log_with(missing)
+    for given in (None, 0.05):
+        with pytest.raises(InputError, match="--fill") as told:
+            blanking.fill_gaps(drive, given)
+        named = re.search(r"--fill ([0-9.]+) ", str(told.value))
+        assert named is not None and (given is None) == ("add --fill" in str(told.value))
+        assert np.isfinite(np.asarray(blanking.fill_gaps(drive, float(named[1]))["v_x"])).all()
+        with pytest.raises(InputError, match="raise --fill"):
+            blanking.fill_gaps(drive, float(named[1]) - 0.01)
+
+
+def test_a_channel_without_any_value_cannot_be_filled():
+    for given in (None, 1.0):
+        with pytest.raises(InputError, match="v_x has no value in any row: map another column"):
+            blanking.fill_gaps(log_with(np.ones(ROWS, bool)), given)
+
+
+def needed_throughout():
+    """Every method, and each channel that it needs in every row."""
+    for quantity, module in QUANTITIES.items():
+        for method, one in module.METHODS.items():
+            for need in one.make(estimators.kit.FULL_CAR).needs:
+                if need.throughout:
+                    yield quantity, method, need.channel
+
+
+@pytest.mark.parametrize(("quantity", "method", "channel"), list(needed_throughout()))
+def test_the_option_that_a_method_names_fills_what_it_needs(quantity, method, channel):
+    needs = QUANTITIES[quantity].METHODS[method].make(estimators.kit.FULL_CAR).needs
+    values = 20.0 + np.sin(TIME)
+    gap = np.where((np.arange(ROWS) > 20) & (np.arange(ROWS) < 27), np.nan, values)
+    log = Recording(TIME, {need.channel: gap if need.channel == channel else values for need in needs})
+    with pytest.raises(InputError, match="NaN in 6 rows") as told:
+        estimators.kit.check_needs("the method", needs, log)
+    named = re.search(r"Fill it with --fill ([0-9.]+[0-9])\.$", blanking.with_fill_option(str(told.value)))
+    assert named is not None, told.value
+    for name in inputs_of((quantity,), (method,), estimators.kit.FULL_CAR):
+        if name in log:
+            log = blanking.fill_short(log, name, float(named[1]))
+    estimators.kit.check_needs("the method", needs, log)
+
+
+def test_without_methods_the_recommended_ones_are_filled():
+    every = inputs_of(tuple(QUANTITIES), None, estimators.kit.FULL_CAR)
+    assert set(FILLED) <= set(every)
+    for name, module in QUANTITIES.items():
+        assert set(inputs_of((name,), (module.RECOMMENDED,), estimators.kit.FULL_CAR)) <= set(every)

@@ -306,3 +306,35 @@ def test_what_is_no_table_is_told(tmp_path, case):
     text, words = NO_TABLES[case]
     with pytest.raises(InputError, match=words):
         read(tmp_path / "log.csv", text)
+
+
+BRACKETS = ("[]", "()", "<>", "  ")
+
+
+@pytest.mark.parametrize("brackets", BRACKETS)
+@pytest.mark.parametrize("suffix", [".csv", ".txt", ".parquet", ".mf4", ".nc"])
+def test_units_in_brackets_are_those_inside(suffix, brackets, tmp_path):
+    """Many loggers write `[km/h]`: on a line of units, and in the units of other formats."""
+    around = lambda unit: f"{brackets[0]}{unit}{brackets[1]}"
+    time, speed, pressure, share = (
+        0.01 * np.arange(50),
+        np.linspace(36.0, 72.0, 50),
+        np.arange(50.0),
+        np.linspace(0, 1, 50),
+    )
+    units = {"v_x": around("km/h"), "hydraulics": around("bar"), "throttle": around("-")}
+    path = tmp_path / f"log{suffix}"
+    if suffix in (".csv", ".txt"):
+        lines = ["time,v_x,hydraulics,throttle", ",".join([around("s"), *units.values()])]
+        rows = zip(time, speed, pressure, share, strict=True)
+        path.write_text("\n".join([*lines, *(",".join(f"{cell:.9f}" for cell in row) for row in rows)]) + "\n")
+    else:
+        log = Recording(time, {"v_x": speed, "hydraulics": pressure, "throttle": share}, units)
+        io.write_recording(log, path)
+    read = io.read_recording(path)
+    np.testing.assert_allclose(read["v_x"], speed / 3.6, rtol=1e-6)
+    np.testing.assert_allclose(read["throttle"], share, atol=1e-8)
+    np.testing.assert_allclose(read["hydraulics"], pressure)
+    assert read.unit("v_x") == "m/s"
+    if suffix in (".csv", ".txt"):  # other formats keep what they were given
+        assert read.unit("hydraulics") == "bar"
