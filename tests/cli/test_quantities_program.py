@@ -142,7 +142,7 @@ def test_a_gap_is_told_with_the_option_that_fills_it(drive, methods):
     io.write_recording(log.replace(steer=steer), drive / "drive.csv", overwrite=True)
     result = estimate(drive, "--what", "sideslip", "--methods", methods, "--anyway")
     words = " ".join(result.output.split())
-    assert "Fill it with --fill" in words and "recording.fill" not in words, result.output
+    assert "Fill it with --fill" in words and "recording.fill(" not in words, result.output
 
 
 def test_the_catalogue_is_what_the_methods_declare():
