@@ -158,7 +158,9 @@ def test_every_method_is_raced_on_drives_that_are_driven():
 def test_the_scores_of_methods_with_as_many_quantities_are_one_program(monkeypatch):
     """Of any two methods, whatever channels they read."""
     there = ["true.sideslip", "true.v_y", "true.v_x", "true.roll", "true.roll_rate", "true.bank", "true.friction"]
-    drives = {name: np.zeros((2, 3, 700)) for name in (*racing.channels_kept(), *there)} | {"car": np.zeros((2, 3), int)}
+    drives = {name: np.zeros((2, 3, 700)) for name in (*racing.channels_kept(), *there)} | {
+        "car": np.zeros((2, 3), int)
+    }
     texts = {}
     for shown in (["sideslip"], ["v_x"], ["bank"], ["friction"], ["sideslip", "v_y"], ["roll", "roll_rate"]):
         module = types.SimpleNamespace(SHOWN=dict.fromkeys(shown, "-"))

@@ -88,10 +88,15 @@ def test_a_score_of_values_and_data_is_what_a_run_would_return(folder, tmp_path,
     monkeypatch.setattr(study_stores, "RUNS", 4)
     design, data = Design(scale=[1.0, 2.0, 3.0]), {"x": np.random.default_rng(0).normal(size=(3, COUNT, 6))}
     run = lambda point, drive: {"said": {"mean": point.scale * jnp.cumsum(drive["x"]), "std": drive["x"] ** 2}}
-    score = lambda said, drive: {"rmse": jnp.sqrt(jnp.mean((said["said.mean"] - drive["x"]) ** 2)), "std": said["said.std"]}
+    score = lambda said, drive: {
+        "rmse": jnp.sqrt(jnp.mean((said["said.mean"] - drive["x"]) ** 2)),
+        "std": said["said.std"],
+    }
     stores = Stores(tmp_path) if folder else IN_MEMORY
     found = stores.sweep("scored", run, design, data=data, score=score)
-    whole = sweeps.sweep(lambda point, drive: score(sweeps.running.arrays_of(run(point, drive)), drive), design, data=data)
+    whole = sweeps.sweep(
+        lambda point, drive: score(sweeps.running.arrays_of(run(point, drive)), drive), design, data=data
+    )
     assert set(found.values) == {"rmse", "std"} and found["rmse"].shape == (3, COUNT)
     for name in whole.values:
         np.testing.assert_allclose(found[name], whole[name], rtol=1e-12)

@@ -133,10 +133,11 @@ def race_methods(
             left_out[quantity, name] = f"the drives have no {', '.join(lacking)}"
             continue
         shown = [one for one in module.SHOWN if f"true.{one}" in drives]
+        run, data = _run(methods, functools.partial(_series, shown)), _data(module, methods[0], drives)
+        score = functools.partial(_score, shown)
         swept = stores.under(quantity).under(name).sweep(
-            "race", _run(methods, functools.partial(_series, shown)), _design(), seeds, key, data=_data(module, methods[0], drives),
-            score=functools.partial(_score, shown), progress=told,
-        )  # fmt: skip
+            "race", run, _design(), seeds, key, data=data, score=score, progress=told
+        )
         for path, values in swept.values.items():
             one, metric = path.rsplit(".", 1)
             found.setdefault((quantity, name, one), {})[metric] = values
