@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.errors import InputError
+from jaxveh.io.national_dates import in_iso_order, is_national
 from jaxveh.io.optional import require
 from jaxveh.io.toml import shorten
 
@@ -22,14 +23,14 @@ _MINUTES = re.compile(r"\s*(?P<minutes>\d+):(?P<seconds>[0-5]\d[.,]\d+)\s*")
 
 def is_stamp(text: str) -> bool:
     """Whether a text is a time stamp in one of the forms that `seconds` reads."""
-    return any(form.fullmatch(text) for form in (_DATE, _DURATION, _CLOCK, _MINUTES))
+    return is_national(text) or any(form.fullmatch(text) for form in (_DATE, _DURATION, _CLOCK, _MINUTES))
 
 
 def seconds(cells: Any, what: str) -> np.ndarray | None:
     """Return dates as seconds since 1970, and durations and times of day as seconds, (n,); None for anything else.
 
-    `cells`: an array (n,) of dates or durations, or of texts; empty ones are NaN. Dates without a zone count as UTC; times of day
-    go on after midnight.
+    `cells`: an array (n,) of dates or durations, or of texts; empty ones are NaN. Dates without a zone count as UTC, and may be in
+    the order of a country (`national_dates`); times of day go on after midnight.
 
     **Raises** `InputError` for the first text that is none if others are.
     """
@@ -43,10 +44,11 @@ def seconds(cells: Any, what: str) -> np.ndarray | None:
     first = next((one for one in texts if isinstance(one, str) and one.strip()), "")
     if not is_stamp(first):
         return None
-    dates = _DATE.fullmatch(first) is not None
+    texts = in_iso_order([one if isinstance(one, str) else "" for one in texts], what)
+    dates = next(_DATE.fullmatch(one) is not None for one in texts if one.strip())
     found = np.full(len(texts), np.nan)
     for row, text in enumerate(texts):
-        if isinstance(text, str) and text.strip():
+        if text.strip():
             if not is_stamp(text) or (_DATE.fullmatch(text) is not None) != dates:
                 raise InputError(f"{what}, data row {row + 1}: {shorten(text)} is no time stamp like {shorten(first)}.")
             found[row] = np.nan if dates else _of_clock(text)
@@ -79,9 +81,9 @@ def of_packed_clock(cells: Any) -> Any:
     return after_midnight(np.round(3600.0 * hours + 60.0 * minutes + seconds, 6))
 
 
-def _point(text: Any) -> str | None:
+def _point(text: str) -> str | None:
     """Return a date with a point before the fraction; None for an empty cell."""
-    return text.strip().replace(",", ".") if isinstance(text, str) and text.strip() else None
+    return text.strip().replace(",", ".") or None
 
 
 def _of_clock(text: str) -> float:

@@ -156,6 +156,9 @@ STAMPS = {
     ),
     "a blank": lambda at: at.strftime("%Y-%m-%d %H:%M:%S.%f"),
     "a comma": lambda at: at.strftime("%Y-%m-%d %H:%M:%S,%f")[:-3],
+    "a date with dots": lambda at: at.strftime("%d.%m.%Y %H:%M:%S,%f"),
+    "a short date with dots": lambda at: f"{at.day}.{at.month}.{at.year} {at.hour}:{at.strftime('%M:%S.%f')}",
+    "a date with slashes": lambda at: at.strftime("%Y/%m/%d %H:%M:%S.%f"),
     "time of day": lambda at: at.strftime("%H:%M:%S.%f")[:-3],
     "time of day, comma": lambda at: at.strftime("%H:%M:%S,%f"),
     "days": lambda at: f"0 days {at.strftime('%H:%M:%S.%f')}",
@@ -176,6 +179,29 @@ def test_time_stamps_become_seconds(tmp_path, form, hour):
     np.testing.assert_allclose(recording.time - recording.time[0], steps, atol=1e-6)
     since = begin.replace(tzinfo=datetime.UTC).timestamp() if form.startswith(("ISO", "a ")) else 3600 * hour
     np.testing.assert_allclose(recording.time[0], since, atol=1e-2)
+
+
+@pytest.mark.parametrize("order", ["%d/%m/%Y %H:%M:%S", "%m/%d/%Y %H:%M:%S.%f"])
+@pytest.mark.parametrize("day", [1, 5, 12, 13, 31])
+def test_dates_with_slashes_are_read_if_a_row_tells_their_order(tmp_path, order, day):
+    begin = datetime.datetime(2024, 3, day, 23, 59, 58)
+    times = [begin + datetime.timedelta(seconds=k) for k in range(4)]
+    text = "time,v_x\n" + "".join(f"{at.strftime(order)},{k}\n" for k, at in enumerate(times))
+    told = any(at.day > 12 for at in times)
+    if told:
+        since = [at.replace(tzinfo=datetime.UTC).timestamp() for at in times]
+        np.testing.assert_allclose(read(tmp_path / "log.csv", text).time, since, atol=1e-6)
+    else:
+        with pytest.raises(
+            InputError, match=r"column 'time': '.*2024.*: begins with the day or the month\. Write dates as"
+        ):
+            read(tmp_path / "log.csv", text)
+
+
+def test_dates_with_slashes_in_two_orders_are_refused(tmp_path):
+    text = "time,v_x\n13/03/2024 10:00:00,1\n03/14/2024 10:00:00,2\n"
+    with pytest.raises(InputError, match=r"some rows begin with the day and others with the month"):
+        read(tmp_path / "log.csv", text)
 
 
 def test_a_missing_time_of_day_is_no_midnight(tmp_path):

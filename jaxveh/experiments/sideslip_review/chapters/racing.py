@@ -135,8 +135,10 @@ def race_methods(
         shown = [one for one in module.SHOWN if f"true.{one}" in drives]
         run, data = _run(methods, functools.partial(_series, shown)), _data(module, methods[0], drives)
         score = functools.partial(_score, shown)
-        swept = stores.under(quantity).under(name).sweep(
-            "race", run, _design(), seeds, key, data=data, score=score, progress=told
+        swept = (
+            stores.under(quantity)
+            .under(name)
+            .sweep("race", run, _design(), seeds, key, data=data, score=score, progress=told)
         )
         for path, values in swept.values.items():
             one, metric = path.rsplit(".", 1)

@@ -1,0 +1,51 @@
+"""Dates as countries write them, such as `01.03.2024 10:59:55,5` or `3/1/2024 10:59:55`, brought into the order of ISO 8601."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from jaxveh._core.errors import InputError
+from jaxveh.io.toml import shorten
+
+_CLOCK = r"[T ]\s*(?P<hour>\d\d?)(?P<rest>:\d\d.*)"
+_DAY_FIRST = re.compile(rf"\s*(?P<day>\d\d?)\.(?P<month>\d\d?)\.(?P<year>\d{{4}}){_CLOCK}")
+_YEAR_FIRST = re.compile(rf"\s*(?P<year>\d{{4}})[/.](?P<month>\d\d?)[/.](?P<day>\d\d?){_CLOCK}")
+_SLASHES = re.compile(rf"\s*(?P<one>\d\d?)/(?P<other>\d\d?)/(?P<year>\d{{4}}){_CLOCK}")
+
+
+def in_iso_order(texts: Sequence[str], what: str) -> list[str]:
+    """Return texts with dates in the order of ISO 8601; other texts as they are.
+
+    Dots have the day first. With slashes it is the day or the month, whichever no row of the column contradicts.
+
+    **Raises** `InputError` for slashes if no row tells which.
+    """
+    slashed = [found for text in texts if (found := _SLASHES.fullmatch(text))]
+    if not slashed:
+        return [_iso(text, "") for text in texts]
+    day_first, month_first = (any(int(one[part]) > 12 for one in slashed) for part in ("one", "other"))
+    if day_first == month_first:
+        why = (
+            "some rows begin with the day and others with the month"
+            if day_first
+            else "begins with the day or the month"
+        )
+        raise InputError(f"{what}: {shorten(slashed[0][0])}: {why}. Write dates as 2024-03-01T10:00:00.5.")
+    return [_iso(text, "day" if day_first else "month") for text in texts]
+
+
+def is_national(text: str) -> bool:
+    """Whether a text is a date and a time of day in one of these orders."""
+    return any(form.fullmatch(text) for form in (_DAY_FIRST, _YEAR_FIRST, _SLASHES))
+
+
+def _iso(text: str, first: str) -> str:
+    found = _DAY_FIRST.fullmatch(text) or _YEAR_FIRST.fullmatch(text) or _SLASHES.fullmatch(text)
+    if found is None:
+        return text
+    parts = found.groupdict()
+    if first:
+        one, other = parts["one"], parts["other"]
+        parts["day"], parts["month"] = (one, other) if first == "day" else (other, one)
+    return f"{parts['year']}-{parts['month']:0>2}-{parts['day']:0>2} {parts['hour']:0>2}{parts['rest']}"
