@@ -68,9 +68,8 @@ class Recording(Kept, eqx.Module):
             if np.any(steps <= 0):
                 k = int(np.argmax(steps <= 0))
                 raise InputError(
-                    f"recording: time[{k + 1}] = {time[k + 1]} after time[{k}] = {time[k]}: must be strictly "
-                    "increasing. Two drives in one file? Split them where time steps back; otherwise sort the rows and drop "
-                    "repeated time stamps."
+                    f"recording: time[{k + 1}] = {time[k + 1]} after time[{k}] = {time[k]}: must be strictly increasing. "
+                    f"{_remedy(time, k)}"
                 )
 
     @classmethod
@@ -295,6 +294,14 @@ def check_recording(who: str, recording: Any) -> None:
         raise InputError(
             f"{who}: recording.time has shape {np.shape(recording.time)}: must be (T,), one drive.{_several(recording)}"
         )
+
+
+def _remedy(time: np.ndarray, k: int) -> str:
+    """What to do about time stamps (T,) of which that in row k + 1 is not larger than that in row k."""
+    if time[k + 1] == time[k] and np.array_equal(time, time.astype(np.float32)) and abs(time[k]) > 1e5:
+        step = np.spacing(np.float32(abs(time[k])))
+        return f"The stamps have lost their digits in float32, whose step is {step:g} s here: write them in float64."
+    return "Two drives in one file? Split them where time steps back; otherwise sort the rows and drop repeated time stamps."
 
 
 def _several(recording: Recording) -> str:

@@ -74,7 +74,7 @@ def _raster(label: str, time: np.ndarray, missing: float) -> list[LogFinding]:
     longest = int(np.argmax(steps))
     message = (
         f"{int(gaps.sum())} gap(s), the longest {steps[longest]:.4g} s at {shown_time(time[longest])} s, together "
-        f"{steps[gaps].sum():.4g} s. Filters predict across them; fill inputs with recording.fill."
+        f"{steps[gaps].sum():.4g} s. Filters predict across them; fill inputs with --fill, or recording.fill."
     )
     if steps[longest] > LONG:
         message += " A clock that jumped, or two drives in one log? Estimates restart after it."

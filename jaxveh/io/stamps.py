@@ -29,8 +29,8 @@ def is_stamp(text: str) -> bool:
 def seconds(cells: Any, what: str) -> np.ndarray | None:
     """Return dates as seconds since 1970, and durations and times of day as seconds, (n,); None for anything else.
 
-    `cells`: an array (n,) of dates or durations, or of texts; empty ones are NaN. Dates without a zone count as UTC, and may be in
-    the order of a country (`national_dates`); times of day go on after midnight.
+    `cells`: an array (n,) of dates or durations, or of texts; empty ones are NaN. Dates without a zone count as UTC, and may
+    be in the order of a country (`national_dates`); times of day go on after midnight.
 
     **Raises** `InputError` for the first text that is none if others are.
     """

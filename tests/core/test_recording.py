@@ -178,3 +178,19 @@ def test_times_keep_their_digits_without_x64(float32):
     recording = Recording(1.7e9 + np.array([0.0, 0.01]), {"a": [1.0, 2.0]})
     np.testing.assert_allclose(np.diff(recording.time), 0.01, rtol=1e-4)
     assert recording["a"].dtype == jnp.float32
+
+
+@pytest.mark.parametrize("since", [0.0, 86_400.0, 1.7e9])
+def test_stamps_that_float32_has_worn_down_are_told_from_repeated_ones(since):
+    time = (since + 0.001 * np.arange(500)).astype(np.float32)
+    if np.all(np.diff(time) > 0):
+        assert Recording(time, {"a": time}).time.dtype == np.float64
+        time = np.sort(np.append(time, time[7]))
+        pattern = "drop repeated time stamps"
+    else:
+        pattern = "lost their digits in float32" if since > 1e5 else "drop repeated time stamps"
+    with pytest.raises(InputError, match=pattern):
+        Recording(time, {"a": time})
+    # Whole seconds since 1970, twice, are as they were written.
+    with pytest.raises(InputError, match="drop repeated"):
+        Recording(np.array([1_700_000_001.0, 1_700_000_001.0]), {"a": np.zeros(2)})
