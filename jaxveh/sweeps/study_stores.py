@@ -76,8 +76,11 @@ class Stores:
         own, which sweeps of many runs with the same kinds of values share. The result is in memory: the tables of a study read
         each value many times.
 
-        **Raises** `InputError` as `sweeps.sweep` does, and if chunks have failed: the study needs all of them.
+        **Raises** `InputError` as `sweeps.sweep` does, for a `score` without data or with choices, and if chunks have failed: the
+        study needs all of them.
         """
+        if score is not None and (design.choices or data is None):
+            raise InputError("score: needs data, and a design of numbers alone: values of choices differ in shape.")
         if self.folder is None:
             at_once = batch if alike is None else alike
             found = sweep(run, design, seeds, key, data=data, batch=at_once, devices=devices, progress=progress)
@@ -127,8 +130,6 @@ class Stores:
 
 def _scored(found: Swept, score: Callable[..., Any], data: Any, batch: int | None, devices: list | None) -> Swept:
     """The scores of a sweep's values, as a sweep of their own."""
-    if found.design.choices or data is None:
-        raise InputError("score: needs data, and a design of numbers alone: values of choices differ in shape.")
     one = lambda point, given: score(*given)
     return sweep(one, found.design, data=(dict(found.values), data), batch=batch, devices=devices)
 

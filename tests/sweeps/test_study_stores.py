@@ -105,10 +105,12 @@ def test_a_score_of_values_and_data_is_what_a_run_would_return(folder, tmp_path,
         assert set(sweeps.read_sweep(tmp_path / "scored.zarr").values) == {"rmse", "std"}
 
 
-def test_a_score_needs_data_and_numbers():
+@pytest.mark.parametrize("folder", [False, True])
+def test_a_score_needs_data_and_numbers(folder, tmp_path):
+    stores = Stores(tmp_path) if folder else IN_MEMORY
     run, score = lambda point, key: {"x": jnp.zeros(3)}, lambda said, drive: said
     with pytest.raises(InputError, match=r"score: needs data, and a design of numbers"):
-        IN_MEMORY.sweep("x", run, Design(scale=[1.0]), 2, jax.random.key(0), score=score)
+        stores.sweep("x", run, Design(scale=[1.0]), 2, jax.random.key(0), score=score)
     choices = Design(law={"one": 1, "two": 2})
     with pytest.raises(InputError, match=r"score: needs data, and a design of numbers"):
-        IN_MEMORY.sweep("x", lambda point, drive: {"x": drive}, choices, data=np.zeros((2, 3)), score=score)
+        stores.sweep("x", lambda point, drive: {"x": drive}, choices, data=np.zeros((2, 3)), score=score)
