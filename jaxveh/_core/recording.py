@@ -310,13 +310,15 @@ def _several(recording: Recording) -> str:
     return one if np.ndim(recording.time) > 1 else ""
 
 
-def longest_gap(recording: Recording, name: str) -> float:
-    """Return the longest time without a sample of a channel, s: of rows between samples, or beyond the first or last one.
+def gap_to_fill(recording: Recording, name: str) -> float:
+    """Return the length (s) up to which gaps of a channel must be filled so that none is left, rounded up to milliseconds.
 
-    It is infinite without any sample, and 0 if there is one in every row.
+    A gap is the time between two samples with rows in between, or beyond the first or last one. It is infinite without any
+    sample.
     """
     time, known = np.asarray(recording.time), np.flatnonzero(np.isfinite(np.asarray(recording[name])))
     if known.size == 0:
         return float("inf")
     inside = np.diff(time[known])[np.diff(known) > 1]
-    return float(max(inside.max(initial=0.0), time[known[0]] - time[0], time[-1] - time[known[-1]]))
+    longest = max(inside.max(initial=0.0), time[known[0]] - time[0], time[-1] - time[known[-1]])
+    return float(np.ceil(1e3 * longest + 1e-3) / 1e3)

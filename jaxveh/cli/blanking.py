@@ -11,7 +11,7 @@ import numpy as np
 from jaxveh import InputError, Recording
 from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
-from jaxveh._core.recording import longest_gap
+from jaxveh._core.recording import gap_to_fill
 from jaxveh.diagnostics import kit
 from jaxveh.estimators import sideslip
 
@@ -48,8 +48,7 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
                     f"input channel {name} has no value in any row: map another column with --channels (jaxveh schema channels)."
                 )
             first = np.asarray(recording.time)[np.argmax(gaps)]
-            # Rounded up, so that it reaches.
-            needed = np.ceil(1e3 * longest_gap(recording, name) + 1e-3) / 1e3
+            needed = gap_to_fill(recording, name)
             advice = f"{'add' if max_gap is None else 'raise'} --fill {needed:g} to fill them, or take a --span without the gap"
             raise InputError(
                 f"input channel {name} is NaN in {int(gaps.sum())} rows, first at t = {first:g} s: inputs must be finite; "

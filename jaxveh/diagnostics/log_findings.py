@@ -125,6 +125,15 @@ def _inside(size: int, edge: int) -> np.ndarray:
     return inside
 
 
+SAME = 1.35
+"""Ratio up to which two channels that must agree do: scales and offsets of sensors, and motions that a relation leaves out."""
+
+
+def is_one(slope: float) -> bool:
+    """Whether a slope of one channel over another, which should be 1, is, within `SAME`."""
+    return slope > 0 and bool(abs(np.log(slope)) < np.log(SAME))
+
+
 _ALIKE = 10
 
 

@@ -32,7 +32,9 @@ _FORCE, _TORQUE = Limit(3e5, "N", "another unit", False), Limit(3e5, "N m", "ano
 LIMITS = {
     **dict.fromkeys(("v_x", "v_y", "speed"), _SPEED),
     "climb_rate": Limit(25.0, "m/s", "km/h", False),
-    **dict.fromkeys(("sideslip", "lane_heading", "slip_angle_front", "slip_angle_rear"), _ANGLE),
+    "sideslip": _ANGLE,
+    # Slip angles of a wheel that stands, or of a car that spins, are any.
+    **dict.fromkeys(("lane_heading", "slip_angle_front", "slip_angle_rear"), _ANGLE._replace(sure=False)),
     **dict.fromkeys(("roll", "pitch", "grade", "bank"), _TILT),
     **dict.fromkeys(("yaw_rate", "roll_rate", "pitch_rate"), _RATE),
     **dict.fromkeys(("a_x", "a_y"), _ACCELERATION),
@@ -64,7 +66,7 @@ NEGATIVE = 0.02
 """Share of the largest magnitude below zero that is taken for an offset or noise of a sensor."""
 
 WEAK_BRAKES = 5e3
-"""Pressure that no brake works with, Pa; an idle sensor in Pa has more noise."""
+"""A twentieth of a bar, Pa: a brake that works reaches more."""
 
 
 def check_units(log: LogView) -> list[LogFinding]:

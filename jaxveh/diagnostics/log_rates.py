@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import LogFinding, LogView, fit
+from jaxveh.diagnostics.log_findings import LogFinding, LogView, fit, is_one
 from jaxveh.diagnostics.log_signs import AGREE, SCALED
 
 RATES = {
@@ -48,7 +48,7 @@ def _compare(log: LogView, name: str, rate: str) -> list[LogFinding]:
     if slope < 0:
         advice = _CLOCKWISE if rate == "yaw_rate" else "Set sign = -1 in the channel map."
         return [LogFinding("error", name, f"{story}: one of the two has the wrong sign. {advice}", values)]
-    if abs(np.log(slope)) < np.log(1.35):
+    if is_one(slope):
         return [LogFinding("ok", name, f"{story}.", values)]
     if correlation < SCALED:
         return []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import GRAVITY, LogFinding, LogView, fit
+from jaxveh.diagnostics.log_findings import GRAVITY, LogFinding, LogView, fit, is_one
 from jaxveh.diagnostics.log_steering import GENTLE
 from jaxveh.io import CarSpecification
 
@@ -65,7 +65,7 @@ def check_signs(log: LogView) -> list[LogFinding]:
     if steering is not None:
         findings.append(_steering(steering, _correlation(log, GENTLE), lateral))
     if lateral is not None:
-        slides = _slides(lateral, _lateral(log, GENTLE)) or _lags(log, lateral)
+        slides = _slides(lateral, _lateral(log, GENTLE)) or _turns_quickly(log, lateral)
         findings.append(slides or _if_slow(log, _slope("a_y", "v_x yaw_rate", lateral, _LATERAL, "yaw_rate or a_y")))
     if log.has("v_x", "v_y", "yaw_rate", "a_y"):
         findings += _sideways(log)
@@ -156,15 +156,15 @@ def _steering(correlation: float, gently: float, lateral: tuple[float, float, fl
 
 def _slides(line: tuple[float, float, float], gently: tuple[float, float, float]) -> LogFinding | None:
     """The finding that a_y differs from v_x yaw_rate, but not in gentle turns, as of a car that spins; None otherwise."""
-    if _is_one(line[0]) or not _is_one(gently[0]) or gently[2] < SCALED:
+    if is_one(line[0]) or not is_one(gently[0]) or gently[2] < SCALED:
         return None
     message = f"is {line[0]:.3g} times v_x yaw_rate, in gentle turns {gently[0]:.3g} times: a car that slides."
     return LogFinding("note", "a_y", message, {"slope": line[0], "gently": gently[0], "correlation": gently[2]})
 
 
-def _lags(log: LogView, line: tuple[float, float, float]) -> LogFinding | None:
+def _turns_quickly(log: LogView, line: tuple[float, float, float]) -> LogFinding | None:
     """The finding that a_y differs from v_x yaw_rate, but not from v_x yaw_rate + dv_y/dt, as in quick turns; None otherwise."""
-    if line[2] < AGREE or _is_one(line[0]):
+    if line[2] < AGREE or is_one(line[0]):
         return None
     arms = _ARMS if log.car is None else (_arms(log.car),)
     slopes = [slope for one in arms if (slope := _with_sideslip(log, *one)) is not None]
@@ -194,18 +194,14 @@ def _arms(car: CarSpecification) -> tuple[float, float]:
 def _with_sideslip(log: LogView, arm: float, inertia: float) -> float | None:
     """Return a_y over v_x yaw_rate + dv_y/dt; None if it is not 1, or a_y does not follow.
 
-    A linear rear axle has v_y = b yaw_rate - K v_x (a_y - I/(m a) dyaw_rate/dt): b is the `arm`, I/(m a) the `inertia`, and K is
-    fitted, too."""
+    A linear rear axle has v_y = b yaw_rate - K v_x (a_y - I/(m a) dyaw_rate/dt): b is the `arm` (m), I/(m a) the `inertia` (m),
+    and K (rad per m/s^2) is fitted, too."""
     twice = lambda name: log.smooth(log.smooth(log.even(name), 0.2), 0.2)  # for a rate of a rate
     speed, yaw_rate, a_y = log.even("v_x"), twice("yaw_rate"), twice("a_y")
     turning = speed * yaw_rate + arm * log.slope(yaw_rate)
     pushed = -speed * log.slope(a_y - inertia * log.slope(yaw_rate))
     (_, slope, softness), _, correlation = fit(log.while_moving(a_y), turning, pushed)
-    return float(slope) if _is_one(slope) and softness > 0.0 and correlation > SCALED else None
-
-
-def _is_one(slope: float) -> bool:
-    return slope > 0 and bool(abs(np.log(slope)) < np.log(1.35))
+    return float(slope) if is_one(slope) and softness > 0.0 and correlation > SCALED else None
 
 
 def _slope(name: str, other: str, line: tuple[float, float, float], table: dict, blamed: str) -> LogFinding:
@@ -221,7 +217,7 @@ def _slope(name: str, other: str, line: tuple[float, float, float], table: dict,
         return LogFinding(
             "error", name, f"{story}: {blamed} has the wrong sign. Set sign = -1 in the channel map.", values
         )
-    if _is_one(slope):
+    if is_one(slope):
         if abs(intercept) > 0.5:
             return LogFinding("warning", name, f"{story}: a bias of {intercept:.2g} m/s^2, or a banked road.", values)
         return LogFinding("ok", name, f"{story} (correlation {correlation:.2f}).", values)

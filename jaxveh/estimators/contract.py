@@ -31,7 +31,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.labelled import Labelled
 from jaxveh._core.overview import Overview
-from jaxveh._core.recording import Recording, check_recording, longest_gap
+from jaxveh._core.recording import Recording, check_recording, gap_to_fill
 from jaxveh._core.shown import Shown, above
 from jaxveh.fitting import Fit
 from jaxveh.io import CarSpecification
@@ -80,7 +80,7 @@ def _check_known(who: str, name: str, recording: Recording) -> None:
     if gaps.all():
         raise InputError(f"{who}: input channel {name} has no value in any row. Map another column, or leave it out.")
     if gaps.any():
-        needed = np.ceil(1e3 * longest_gap(recording, name) + 1e-3) / 1e3  # rounded up, so that it reaches
+        needed = gap_to_fill(recording, name)
         raise InputError(
             f"{who}: input channel {name} is NaN in {int(gaps.sum())} rows, first at t = "
             f"{np.asarray(recording.time)[np.argmax(gaps)]:g} s: an input must be known in every row. "

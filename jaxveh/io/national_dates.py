@@ -8,19 +8,22 @@ from collections.abc import Sequence
 from jaxveh._core.errors import InputError
 from jaxveh.io.toml import shorten
 
-_CLOCK = r"[T ]\s*(?P<hour>\d\d?)(?P<rest>:\d\d.*)"
+_CLOCK = r"[T ]\s*(?P<hour>\d\d?)(?P<rest>:\d\d(:\d\d([.,]\d+)?)?)\s*(?P<half>[AaPp][Mm])?\s*"
 _DAY_FIRST = re.compile(rf"\s*(?P<day>\d\d?)\.(?P<month>\d\d?)\.(?P<year>\d{{4}}){_CLOCK}")
 _YEAR_FIRST = re.compile(rf"\s*(?P<year>\d{{4}})[/.](?P<month>\d\d?)[/.](?P<day>\d\d?){_CLOCK}")
 _SLASHES = re.compile(rf"\s*(?P<one>\d\d?)/(?P<other>\d\d?)/(?P<year>\d{{4}}){_CLOCK}")
 
 
 def in_iso_order(texts: Sequence[str], what: str) -> list[str]:
-    """Return texts with dates in the order of ISO 8601; other texts as they are.
+    """Return texts with dates in the order of ISO 8601; other texts as they are, and all if the first that is not empty is none.
 
-    Dots have the day first. With slashes it is the day or the month, whichever no row of the column contradicts.
+    Dots have the day first. With slashes it is the day or the month, whichever no row of the column contradicts. The clock may
+    have twelve hours, with AM or PM.
 
     **Raises** `InputError` for slashes if no row tells which.
     """
+    if not is_national(next((text for text in texts if text.strip()), "")):
+        return list(texts)
     slashed = [found for text in texts if (found := _SLASHES.fullmatch(text))]
     if not slashed:
         return [_iso(text, "") for text in texts]
@@ -48,4 +51,7 @@ def _iso(text: str, first: str) -> str:
     if first:
         one, other = parts["one"], parts["other"]
         parts["day"], parts["month"] = (one, other) if first == "day" else (other, one)
-    return f"{parts['year']}-{parts['month']:0>2}-{parts['day']:0>2} {parts['hour']:0>2}{parts['rest']}"
+    hour = int(parts["hour"])
+    if parts["half"] is not None:
+        hour = hour % 12 + 12 * (parts["half"].casefold() == "pm")
+    return f"{parts['year']}-{parts['month']:0>2}-{parts['day']:0>2} {hour:02}{parts['rest']}"

@@ -23,7 +23,7 @@ _MINUTES = re.compile(r"\s*(?P<minutes>\d+):(?P<seconds>[0-5]\d[.,]\d+)\s*")
 
 def is_stamp(text: str) -> bool:
     """Whether a text is a time stamp in one of the forms that `seconds` reads."""
-    return is_national(text) or any(form.fullmatch(text) for form in (_DATE, _DURATION, _CLOCK, _MINUTES))
+    return any(form.fullmatch(text) for form in (_DATE, _DURATION, _CLOCK, _MINUTES)) or is_national(text)
 
 
 def seconds(cells: Any, what: str) -> np.ndarray | None:

@@ -13,7 +13,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, float_array, is_concrete
 from jaxveh._core.names import check_names, record
 from jaxveh._core.parameter import UNNAMED
-from jaxveh._core.recording import Recording, check_recording, longest_gap, time_for
+from jaxveh._core.recording import Recording, check_recording, gap_to_fill, time_for
 from jaxveh._core.traced import trace_once
 from jaxveh.statespace.dependent_noise import MeasurementNoise, StateDependent
 from jaxveh.statespace.noise import AbstractNoise, Gaussian
@@ -265,7 +265,7 @@ def _channel(recording: Recording, name: str, dtype, is_input: bool):
             k = int(np.argmax(np.isnan(array)))
             if np.isnan(array).all():
                 raise InputError(f"input channel {name} has no value in any row.")
-            needed = np.ceil(1e3 * longest_gap(recording, name) + 1e-3) / 1e3  # rounded up, so that it reaches
+            needed = gap_to_fill(recording, name)
             raise InputError(
                 f"input channel {name} is NaN in {int(np.isnan(array).sum())} rows, first at t = {recording.time[k]} s: "
                 f'an input must be known in every row. Fill it with: recording.fill("{name}", "linear", max_gap={needed:g}).'

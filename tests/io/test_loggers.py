@@ -159,6 +159,7 @@ STAMPS = {
     "a date with dots": lambda at: at.strftime("%d.%m.%Y %H:%M:%S,%f"),
     "a short date with dots": lambda at: f"{at.day}.{at.month}.{at.year} {at.hour}:{at.strftime('%M:%S.%f')}",
     "a date with slashes": lambda at: at.strftime("%Y/%m/%d %H:%M:%S.%f"),
+    "a date with slashes and twelve hours": lambda at: at.strftime("%Y/%m/%d %I:%M:%S.%f %p"),
     "time of day": lambda at: at.strftime("%H:%M:%S.%f")[:-3],
     "time of day, comma": lambda at: at.strftime("%H:%M:%S,%f"),
     "days": lambda at: f"0 days {at.strftime('%H:%M:%S.%f')}",
