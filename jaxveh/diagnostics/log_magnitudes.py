@@ -74,7 +74,9 @@ def check_units(log: LogView) -> list[LogFinding]:
     findings = []
     for name, limit in LIMITS.items():
         if log.has(name):
-            values = log.channels[name][np.isfinite(log.channels[name])]
+            values = _judged(log, name)
+            if not values.size:
+                continue
             findings.append(_size(name, float(np.quantile(np.abs(values), 0.995)), limit))
             findings += _negative(name, values) if name in UNSIGNED else []
     return findings
@@ -93,6 +95,13 @@ def check_gravity(log: LogView) -> list[LogFinding]:
     if abs(usual / GRAVITY - 1.0) < 0.1:
         return found("ok", f"is {usual:.3g} m/s^2 most of the time.")
     return found("note", f"is {usual:.3g} m/s^2 most of the time, not {GRAVITY:g}: was gravity subtracted?")
+
+
+def _judged(log: LogView, name: str) -> np.ndarray:
+    """The finite samples of a channel; of the sideslip angle those while the car moves, since it is any angle at standstill."""
+    moving = name == "sideslip" and log.has("v_x")
+    values = log.while_moving(log.even(name)) if moving else log.channels[name]
+    return values[np.isfinite(values)]
 
 
 def _size(name: str, size: float, limit: Limit) -> LogFinding:

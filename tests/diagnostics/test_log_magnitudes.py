@@ -115,3 +115,13 @@ def test_a_direction_over_ground_is_not_compared_where_the_car_stands():
     v_x = np.where(TIME < 30.0, 0.0, 20.0 + np.sin(TIME))
     rate = np.where(TIME < 30.0, 0.001, rate)
     assert not about(told({"course": lost, "yaw_rate": rate, "v_x": v_x}), "error", "course", "")
+
+
+@pytest.mark.parametrize(("moving", "count"), [(0.05, 0), (60.0, 1)])
+def test_a_sideslip_angle_is_judged_while_the_car_moves(moving, count):
+    """An optical sensor shows any angle at standstill; degrees in motion are an error as before."""
+    stands = (TIME > 20.0) & (TIME < 40.0)
+    sideslip = np.where(stands, np.random.default_rng(2).uniform(-3, 3, TIME.size), moving * np.sin(TIME))
+    found = told({"sideslip": sideslip, "v_x": np.where(stands, 0.0, 20.0 + np.sin(TIME))})
+    assert len(about(found, "error", "sideslip", "looks like degrees")) == count, found
+    assert about(told({"sideslip": sideslip}), "error", "sideslip", "looks like degrees")
