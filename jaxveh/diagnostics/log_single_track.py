@@ -37,19 +37,19 @@ def yaw_rate_from_steer(car: CarSpecification, steer: np.ndarray, v_x: np.ndarra
 def a_y_from_yaw_rate(car: CarSpecification, yaw_rate: np.ndarray, v_x: np.ndarray, step: float) -> np.ndarray:
     """Return the lateral acceleration (N,) in m/s^2 that belongs to a yaw rate (N,) in rad/s if the rear axle is linear.
 
-    The rear axle carries (a m a_y - I_z dr/dt) / L, which gives its slip angle and thus v_y; hence
-    a_y = v_x r + dv_y/dt with v_y = b r - v_x (a m a_y - I_z dr/dt) / (L C_r): v_x r + b dr/dt, delayed by about
-    v_x a m / (L C_r) seconds. Inputs must be finite; the inertial term is small and omitted.
+    The rear axle carries (a m a_y - I_z dr/dt) / L, which gives its slip angle and thus v_y = b r - v_x K w, with the softness
+    K = a m / (L C_r) and w = a_y - I_z / (a m) dr/dt. With a_y = v_x r + dv_y/dt, w follows v_x r + (b - I_z / (a m)) dr/dt with a
+    lag of v_x K seconds (implicit Euler, stable at every speed). Inputs must be finite.
     """
-    delay = v_x * rear_softness(car)
-    drive = v_x * yaw_rate + car.rear_axle_to_cg * np.gradient(yaw_rate, step)
-    a_y = np.empty_like(drive)
-    value = drive[0]
-    for k, (wanted, seconds) in enumerate(zip(drive.tolist(), np.maximum(delay, 0.0).tolist(), strict=True)):
-        share = step / (step + seconds)
-        value = value + share * (wanted - value)
-        a_y[k] = value
-    return a_y
+    lag = np.maximum(v_x * rear_softness(car), 0.0)
+    turning, inertia = np.gradient(yaw_rate, step), car.yaw_inertia / (car.front_axle_to_cg * car.mass)
+    wanted = v_x * yaw_rate + (car.rear_axle_to_cg - inertia) * turning
+    followed = np.empty_like(wanted)
+    value = wanted[0]
+    for k, (target, share) in enumerate(zip(wanted.tolist(), (step / (step + lag)).tolist(), strict=True)):
+        value = value + share * (target - value)
+        followed[k] = value
+    return followed + inertia * turning
 
 
 def steady_v_y(car: CarSpecification, yaw_rate: np.ndarray, v_x: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ import pytest
 
 from jaxveh import InputError, Recording, vehicles
 from jaxveh.diagnostics import check_log
+from jaxveh.diagnostics import kit as kit_of_checks
 from jaxveh.vehicles import kit
 
 TIME = 0.01 * np.arange(1500)
@@ -104,3 +105,16 @@ def test_the_rear_axle_tells_what_the_sideslip_takes_of_a_y():
         (found,) = [one for one in check_log(log, car=told) if "times v_x yaw_rate" in one.message]
         assert found.severity == "note" and found.values["slope"] < 0.7
         assert 0.85 < found.values["with_sideslip"] < 1.2
+
+
+@pytest.mark.parametrize("name", CARS)
+@pytest.mark.parametrize("late", [0.0, 0.1])
+def test_the_delay_of_a_y_is_found_in_quick_turns_too(name, late):
+    """The linear car's a_y follows from its yaw rate exactly, its yaw inertia included."""
+    car = CARS[name]
+    for speed, frequency in ((8.0, 0.7), (20.0, 1.0), (20.0, 0.25)):
+        log, _ = drive(car, speed, frequency, 3)
+        log = log.replace(a_y=np.interp(TIME - late, TIME, np.asarray(log["a_y"])))
+        found = kit_of_checks.a_y_delay(log, car)
+        assert found.correlation > 0.95
+        assert abs(found.seconds - late) < 0.012 + 2 * found.error, (speed, frequency, found)
