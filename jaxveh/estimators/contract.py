@@ -61,8 +61,9 @@ def check_needs(who: str, needs: tuple[Need, ...], recording: Recording, model: 
     missing = [f"{need.channel} ({need.unit})" for need in wanted if need.channel not in recording]
     if missing:
         verb = "is" if len(missing) == 1 else "are"
+        measured = [name for name in recording.names if not name.startswith("true.")]
         raise InputError(
-            f"{who}: {', '.join(missing)} {verb} missing from the log; it has: {', '.join(recording.names) or 'no channel'}. "
+            f"{who}: {', '.join(missing)} {verb} missing from the log; it has: {', '.join(measured) or 'no channel'}. "
             "Name the columns in a channel map, or in the recording."
         )
     for need in wanted:

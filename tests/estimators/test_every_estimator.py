@@ -144,6 +144,7 @@ def test_what_is_missing_is_named_with_what_there_is(name):
     for need in required(name):
         less = case.log.without(need.channel)
         there = ", ".join(less.names)
+        less = less.replace(**{"true.v_y": np.zeros(len(less.time))})
         message = (
             rf"{name}: {need.channel} \({need.unit.replace('^', '.')}\) is missing from the log; it has: {there}\."
         )
