@@ -24,14 +24,14 @@ def _wheels(name: str, *limit) -> dict[str, Limit]:
 
 
 _ANGLE, _TILT = Limit(1.6, "rad", "degrees"), Limit(1.0, "rad", "degrees", False)
-_SPEED, _RATE = Limit(120.0, "m/s", "km/h"), Limit(4.0, "rad/s", "deg/s")
+_SPEED, _RATE = Limit(120.0, "m/s", "km/h or mph"), Limit(4.0, "rad/s", "deg/s")
 _ACCELERATION = Limit(60.0, "m/s^2", "another unit")
 _STEER = Limit(1.2, "rad at the road wheels", "degrees, or the angle of the steering wheel")
 _FORCE, _TORQUE = Limit(3e5, "N", "another unit", False), Limit(3e5, "N m", "another unit", False)
 
 LIMITS = {
     **dict.fromkeys(("v_x", "v_y", "speed"), _SPEED),
-    "climb_rate": Limit(25.0, "m/s", "km/h", False),
+    "climb_rate": Limit(25.0, "m/s", "km/h or feet a minute", False),
     "sideslip": _ANGLE,
     # Slip angles of a wheel that stands, or of a car that spins, are any.
     **dict.fromkeys(("lane_heading", "slip_angle_front", "slip_angle_rear"), _ANGLE._replace(sure=False)),
@@ -45,7 +45,7 @@ LIMITS = {
     "steering_wheel_rate": Limit(60.0, "rad/s", "deg/s", False),
     "steering_torque": Limit(300.0, "N m", "another unit", False),
     **_wheels("omega", 600.0, "rad/s", "revolutions per minute, or deg/s", False),
-    **_wheels("wheel_speed", 150.0, "m/s", "km/h, or a rotation in rad/s"),
+    **_wheels("wheel_speed", 150.0, "m/s", "km/h, mph, or a rotation in rad/s"),
     **_wheels("load", *_FORCE),
     **_wheels("torque", *_TORQUE),
     "throttle": Limit(1.5, "a share", "per cent", False),

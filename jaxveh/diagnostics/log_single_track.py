@@ -38,8 +38,8 @@ def a_y_from_yaw_rate(car: CarSpecification, yaw_rate: np.ndarray, v_x: np.ndarr
     """Return the lateral acceleration (N,) in m/s^2 that belongs to a yaw rate (N,) in rad/s if the rear axle is linear.
 
     The rear axle carries (a m a_y - I_z dr/dt) / L, which gives its slip angle and thus v_y = b r - v_x K w, with the softness
-    K = a m / (L C_r) and w = a_y - I_z / (a m) dr/dt. With a_y = v_x r + dv_y/dt, w follows v_x r + (b - I_z / (a m)) dr/dt with a
-    lag of v_x K seconds (implicit Euler, stable at every speed). Inputs must be finite.
+    K = a m / (L C_r) and w = a_y - I_z / (a m) dr/dt. With a_y = v_x r + dv_y/dt, w follows v_x r + (b - I_z / (a m)) dr/dt with
+    a lag of v_x K seconds (implicit Euler, stable at every speed). Inputs must be finite.
     """
     lag = np.maximum(v_x * rear_softness(car), 0.0)
     turning, inertia = np.gradient(yaw_rate, step), car.yaw_inertia / (car.front_axle_to_cg * car.mass)
