@@ -44,7 +44,8 @@ _TIMES = ("s", "sec", "ms", "us", "µs", "ns")
 
 _GRAD = re.compile(r"grad\b", re.IGNORECASE)
 _BRACKETS = re.compile(r"[\[(<]([^][()<>]*)[])>]")
-_POWER = re.compile(r"(?<=[A-Za-z])-(?=\d)")
+_POWER = re.compile(r"(?<=[A-Za-z])-(?=\d)|(?<=[A-Za-z])(?=[23]\b)")
+_TIMES_SIGN = re.compile(r"(?<=\w) ?[.·⋅×] ?(?=[A-Za-z°])")
 
 
 def is_unit(unit: str | None) -> TypeGuard[str]:
@@ -133,6 +134,9 @@ def _parse(unit: str):
 
 def _spelled(unit: str, target: str) -> str:
     """Return a unit in the spelling of pint, or unchanged."""
-    unit = _POWER.sub("^-", " ".join(unit.replace("º", "°").split()))
+    unit = " ".join(unit.replace("º", "°").split())
+    if unit not in _ALIASES:
+        unit = _TIMES_SIGN.sub("*", unit)  # pint reads dots up to its version 0.25
+        unit = _POWER.sub(lambda found: "^" + found[0], unit)
     unit = _SPELLINGS.get(unit.casefold(), unit)
     return _ALIASES_FOR.get(target, {}).get(unit, _ALIASES.get(unit, unit))

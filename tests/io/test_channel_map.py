@@ -166,11 +166,12 @@ SPELLINGS = {
     ("deg", "rad"): ["Deg", "DEG", "degrees", "°", "º"],
     ("deg/s", "rad/s"): ["Deg/s", "DEG/S", "dps", "degps", "deg/sec", "º/s", "deg s-1", "deg.s-1", "deg·s⁻¹"],
     ("rpm", "rad/s"): ["RPM", "U/min", "1/min", "min-1", "rev/min"],
-    ("m/s^2", "m/s^2"): ["m/s²", "m/s2", "m s-2", "m.s-2", "m\xa0s-2"],
+    ("m/s^2", "m/s^2"): ["m/s²", "m/s2", "mps2", "m/s/s", "m s-2", "m.s-2", "m\xa0s-2", "m·s-2", "m⋅s^-2", "m . s**-2"],
     ("bar", "Pa"): ["Bar", "BAR"],
     ("kPa", "Pa"): ["KPA", "kpa"],
     ("percent", "1"): ["%", "Percent", "pct"],
-    ("N*m", "N*m"): ["Nm", "N m", "N·m", "N-m", "N.m"],
+    ("N*m", "N*m"): ["Nm", "N m", "N·m", "N-m", "N.m", "N × m"],
+    ("kg*m^2", "kg*m^2"): ["kg.m2", "kg m2", "kg·m²", "kg*m**2"],
     ("0.001 g", "m/s^2"): ["mg"],
 }
 
