@@ -138,7 +138,7 @@ CASES: dict[str, Callable] = {
     "sum_in_blocks": lambda x: numerics.sum_in_blocks(
         lambda p, row: numerics.sin(p * row), x, jnp.arange(7, dtype=x.dtype) / 7, block=3
     ),
-    "sum_of_harmonics": lambda x: mixed(numerics.sum_of_harmonics(sides(x), count(x, 0.3, 0.5), sides(x)[:2])),
+    "sum_of_harmonics": lambda x: mixed(numerics.sum_of_harmonics(sides(x), count(x, 0.3, 0.5), sides(x)[:2])) / 2,
     "symmetric": lambda x: mixed(numerics.symmetric(factor(x))),
     "tan": lambda x: numerics.tan(x),
     "write_out": lambda x: mixed(numerics.write_out(lambda c: jnp.sin(c @ c.T), factor(x))),
