@@ -38,7 +38,7 @@ def outputs(tyre, at):
 def ordinary(tyre):
     """Whether no coefficient is so large that forces overflow by right."""
     exponents = tyre.longitudinal.PKX3, tyre.longitudinal.PTX3, tyre.rolling.QSY7, tyre.rolling.QSY8
-    coefficients = numbers(dataclasses.replace(tyre, ranges=None))
+    coefficients = numbers([getattr(tyre, one.name) for one in dataclasses.fields(tyre) if one.name != "ranges"])
     return (np.abs(coefficients) < LARGE).all() and (np.abs(numbers(exponents)) < 10).all()
 
 
