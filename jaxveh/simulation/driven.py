@@ -165,8 +165,8 @@ def vehicle_name(vehicle: Any) -> str:
 
 
 def dtype_of(vehicle: AbstractVehicle) -> Any:
-    """The dtype of the car's parameters, which is also that of its states."""
-    return jnp.result_type(jax.tree.leaves(eqx.filter(vehicle, eqx.is_inexact_array))[0])
+    """The dtype of the car's parameters, the widest if they differ, which is also that of its states."""
+    return jnp.result_type(*jax.tree.leaves(eqx.filter(vehicle, eqx.is_inexact_array)) or [float])
 
 
 def _still(vehicle: AbstractVehicle) -> Motion:

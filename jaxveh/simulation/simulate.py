@@ -31,9 +31,11 @@ from jaxveh.simulation import stiffness
 from jaxveh.simulation.driven import (
     SEVERAL,
     Driven,
+    car_itself,
     check_inputs,
     check_one_drive,
     driver_name,
+    dtype_of,
     first_motion,
     inputs_of,
     vehicle_name,
@@ -43,6 +45,7 @@ from jaxveh.simulation.events import Event
 from jaxveh.simulation.meter import meter_for
 from jaxveh.simulation.solve import Solution, even_grid, grid_through, solve
 from jaxveh.simulation.stiffness import SolverChoice
+from jaxveh.statespace import cast
 from jaxveh.vehicles import AbstractVehicle, Travelling
 
 SOLVERS = ("auto", "explicit", "implicit")
@@ -168,7 +171,10 @@ def driven_car(car: AbstractVehicle, manoeuvre: Any, sensors: SensorSet | None =
     if not isinstance(car, AbstractVehicle):
         order = " The order is simulate(car, manoeuvre)." if isinstance(manoeuvre, AbstractVehicle) else ""
         raise InputError(f"simulate: car = {word_for(car)}: must be a car, such as vehicles.passenger_car().{order}")
-    placed = _place_on_road(strong(car), road)
+    # Everything around the car has the precision of the car itself, also the road on which it may travel.
+    car = strong(car)
+    car, manoeuvre, sensors, road = cast((car, manoeuvre, sensors, road), dtype_of(car_itself(car)))
+    placed = _place_on_road(car, road)
     check_one_drive("manoeuvre", manoeuvre, lambda: inputs_of(manoeuvre, placed))
     driven = Driven(Instrumented(placed, sensors), with_pedals(manoeuvre, placed))
     check_inputs(driven)
