@@ -65,10 +65,8 @@ def arguments_of(made):
 
 
 def may_be(argument, wrong):
-    """Whether a wrong thing is right for an argument: an option that is off; of a flag Python takes anything."""
-    return isinstance(argument.default, bool) or (
-        wrong is None and "None" in str(argument.annotation) + str(argument.default)
-    )
+    """Whether a wrong thing is right for an argument: an option that is off."""
+    return wrong is None and "None" in str(argument.annotation) + str(argument.default)
 
 
 def refuses(made, given, argument, said="", taken=()):

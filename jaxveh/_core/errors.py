@@ -76,6 +76,13 @@ def check_single(**values) -> None:
             raise InputError(f"{name} has the shape {np.shape(value)}: must be one number.")
 
 
+def check_flags(**flags) -> None:
+    """Raise `InputError` unless each of the named values is True or False: to Python, every text is true, "no" as well."""
+    for name, value in flags.items():
+        if not isinstance(value, bool | np.bool_):
+            raise InputError(f"{name} = {word_for(value)}: must be True or False.")
+
+
 def check_known(**values) -> None:
     """Raise `InputError` unless each of the named values is one real number that is known outside of jit, no tracer."""
     check_single(**values)
@@ -156,7 +163,7 @@ def check_seed(name: str, value) -> None:
 
 def check_one_of(name: str, value, allowed) -> None:
     """Raise `InputError` unless `value` is one of `allowed`; the message suggests the most similar one."""
-    if not is_concrete(value) or value not in tuple(allowed):
+    if not is_concrete(value) or isinstance(value, jax.Array | np.ndarray) or value not in tuple(allowed):
         raise InputError(
             f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}.{did_you_mean([value], allowed)}"
         )

@@ -12,7 +12,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_flags
 
 FEW = 6
 """The largest number of members of a family that a message lists."""
@@ -28,7 +28,7 @@ def check_parts(module: eqx.Module) -> None:
 
 
 def check_static(module: eqx.Module) -> None:
-    """Raise `InputError` if a static field holds an array, traced or not.
+    """Raise `InputError` if a static field holds an array, traced or not, or one that is a flag neither True nor False.
 
     It is a part of the program: jax finds a compiled program by comparing it, which of an array fails at some later call, also
     at one of another module that holds a number.
@@ -40,12 +40,19 @@ def check_static(module: eqx.Module) -> None:
                 f"{type(module).__name__}.{name} = {value!r}: must be of plain numbers, such as float(value), known outside of "
                 "jit, vmap and grad: it is a part of the compiled program."
             )
+    check_flags(**{f"{type(module).__name__}.{name}": getattr(module, name) for name in _flags(type(module))})
 
 
 @functools.cache
 def _static_fields(kind: type) -> tuple[str, ...]:
     """The names of the static fields."""
     return tuple(field.name for field in dataclasses.fields(kind) if field.metadata.get("static"))
+
+
+@functools.cache
+def _flags(kind: type) -> tuple[str, ...]:
+    """The names of the static fields that are True or False."""
+    return tuple(f.name for f in dataclasses.fields(kind) if f.metadata.get("static") and f.type in (bool, "bool"))
 
 
 def _in_words(kind: type) -> str:

@@ -11,9 +11,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_one_of, is_concrete
+from jaxveh._core.errors import InputError, check, check_one_of, check_single, is_concrete, word_for
 from jaxveh._core.labelled import TIME, Labelled, Variable, make_again, time_again, time_axis
-from jaxveh._core.names import as_names, check_names
+from jaxveh._core.names import as_mapping, as_names, check_names
 from jaxveh._core.overview import Lazy, Overview, count_of, is_known, missing_share, number, span, stretch
 from jaxveh._core.shown import Kept, above
 
@@ -48,8 +48,12 @@ class Recording(Kept, eqx.Module):
             # It has been checked: `t = recording.time; t -= t[0]` would change the recording.
             time.flags.writeable = False
         self.time = time
+        channels = as_mapping(channels, "recording: channels")
+        units = {} if units is None else as_mapping(units, "recording: units")
         self.channels = {str(name): _float(str(name), values) for name, values in channels.items()}
-        self.units = tuple(sorted((units or {}).items()))
+        self.units = tuple(sorted(units.items()))
+        if not isinstance(source, str):
+            raise InputError(f"recording: source = {word_for(source)}: must be text, a note about where it comes from.")
         self.source = source
 
     def __check_init__(self):
@@ -119,12 +123,14 @@ class Recording(Kept, eqx.Module):
 
     def replace(self, source: str | None = None, units: Mapping[str, str] | None = None, **channels) -> Recording:
         """Return a copy with channels added or replaced by keyword ((T,) arrays), and `units` of new channels."""
-        merged = {**dict(self.units), **(units or {})}
+        merged = {**dict(self.units), **({} if units is None else as_mapping(units, "recording.replace: units"))}
         return Recording(self.time, {**self.channels, **channels}, merged, self.source if source is None else source)
 
     def select(self, names) -> Recording:
         """Return a recording of these channels alone: a name, or several."""
-        names = as_names(names)
+        if names is None:
+            raise InputError("recording.select: names = None: must be the name of a channel, or several.")
+        names = as_names(names, "recording.select: names")
         check_names("recording.select", names, self.channels)
         units = {name: unit for name, unit in self.units if name in names}
         return Recording(self.time, {name: self.channels[name] for name in names}, units, self.source)
@@ -136,6 +142,7 @@ class Recording(Kept, eqx.Module):
 
     def between(self, start: float, end: float) -> Recording:
         """Return the rows with start <= time < end, in the log's own time; raise `InputError` if there are none."""
+        check_single(**{"recording.between: start": start, "recording.between: end": end})
         time = np.asarray(self.time)
         rows = np.flatnonzero((time >= start) & (time < end))
         if rows.size == 0:
@@ -143,8 +150,14 @@ class Recording(Kept, eqx.Module):
         return self.rows(slice(int(rows[0]), int(rows[-1]) + 1))
 
     def rows(self, which: slice) -> Recording:
-        """Return the rows of a slice."""
-        channels = {name: values[which] for name, values in self.channels.items()}
+        """Return the rows of a slice, or of a mask or whole numbers (an array). **Raises** `InputError` for anything else."""
+        try:
+            channels = {name: values[which] for name, values in self.channels.items()}
+        except (TypeError, IndexError):
+            raise InputError(
+                f"recording.rows: which = {word_for(which)}: must be a slice such as slice(0, 100), a mask (T,) or an array of "
+                f"whole numbers; there are {len(self)} rows."
+            ) from None
         return Recording(self.time[which], channels, dict(self.units), self.source)
 
     def fill(self, channel: str, method: str = "hold", max_gap: float = np.inf) -> Recording:
@@ -154,6 +167,8 @@ class Recording(Kept, eqx.Module):
         finite sample, and for `linear` those after the last. Runs on the host, outside jit.
         """
         check_one_of("method", method, ("hold", "linear"))
+        check_single(**{"recording.fill: max_gap": max_gap})
+        check("recording.fill: max_gap", max_gap, lambda v: v > 0, "positive (s), or infinite for any gap")
         check_recording("recording.fill", self)
         values, time = np.array(self[channel]), np.asarray(self.time)
         known = np.flatnonzero(np.isfinite(values))

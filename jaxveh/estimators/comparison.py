@@ -10,7 +10,7 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_kind, check_numbers, check_one_of
+from jaxveh._core.errors import InputError, check_flags, check_has, check_kind, check_numbers, check_one_of
 from jaxveh._core.names import as_names
 from jaxveh._core.recording import Recording, check_recording
 from jaxveh.diagnostics import Score, delay, score_band
@@ -53,10 +53,8 @@ def compare(
     A method that needs a key missing from the car's file or a channel missing from the log is `refused` with the reason. If
     it was named in `methods`, it **raises** `InputError` instead, as does an unknown name.
     """
-    if not hasattr(quantity, "METHODS"):
-        raise InputError(
-            f"compare: quantity = {quantity!r}: must be a module with METHODS, such as estimators.sideslip."
-        )
+    check_flags(smoothed=smoothed)
+    check_has("compare: quantity", quantity, ("METHODS",), "A module of a quantity has them: estimators.sideslip.")
     check_kind("car", car, CarSpecification, "io.read_car reads one from a file.")
     check_recording("compare", recording)
     names = as_names(quantity.METHODS if methods is None else methods, "methods")

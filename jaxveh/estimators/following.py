@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, is_concrete
+from jaxveh._core.errors import InputError, check_flags, is_concrete
 from jaxveh._core.recording import Recording, time_for
 from jaxveh.estimators.contract import check_needs
 from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable, Answer, Answers, dtype_of
@@ -31,6 +31,7 @@ def follow(who: str, method: AbstractMethod, recording: Recording, *, smoothed: 
     **Raises** `InputError` for channels that are missing, in other units, infinite, or not known in every row where they must
     be, and for a method that cannot be smoothed.
     """
+    check_flags(smoothed=smoothed)
     if smoothed and not isinstance(method, AbstractSmoothable):
         raise InputError(
             f"{who}: smoothed: {type(method).__name__} looks back only. Leave smoothed out, or take the recommended "

@@ -11,8 +11,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError
-from jaxveh._core.names import record
+from jaxveh._core.errors import InputError, check_key, check_kind
+from jaxveh._core.names import as_mapping, record
 from jaxveh._core.parameter import check_parameters
 from jaxveh._core.parts import check_parts
 from jaxveh._core.recording import Recording, time_for
@@ -126,6 +126,8 @@ class Live(eqx.Module):
 
     def __check_init__(self):
         check_parts(self)
+        if self.key is not None:
+            check_key("Live", self.key)
 
     def init(self, t, channels: Mapping[str, Any]) -> tuple[LiveBelief, LiveAnswer]:
         """The belief after the first row, and its answer.
@@ -137,17 +139,19 @@ class Live(eqx.Module):
 
     def step(self, belief: LiveBelief, t, channels: Mapping[str, Any]) -> tuple[LiveBelief, LiveAnswer]:
         """The belief after the next row, and its answer. **Raises** `InputError` for an input that is not given."""
+        check_kind("belief", belief, LiveBelief, "`init` and `step` return it first.")
         return live_step(self, belief, self._row(t, channels))
 
     def _row(self, t, channels: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
         """Time and channels as scalars: the channels of the cleaning, otherwise of the model; NaN where not given."""
+        channels = as_mapping(channels, "channels")
         needed = self.cleaning.inputs or self.model.inputs
         missing = [name for name in needed if name not in channels]
         if missing:
             raise InputError(f"row: no value for the input(s) {', '.join(missing)}.")
         names = self.cleaning.channels or (*self.model.inputs, *self.model.channels)
         numbers = [channels.get(name, np.nan) for name in names]
-        t, *values = kit.scalar_row(t, numbers, self.model.prior.mean[0].dtype)
+        t, *values = kit.scalar_row(t, numbers, self.model.prior.mean[0].dtype, tuple(names))
         return t, dict(zip(names, values, strict=True))
 
 

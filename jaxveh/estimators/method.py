@@ -26,7 +26,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.estimated import Estimated
-from jaxveh._core.names import record
+from jaxveh._core.names import as_mapping, record
 from jaxveh._core.parameter import check_parameters
 from jaxveh._core.parts import check_parts
 from jaxveh._core.result import Result, code
@@ -228,13 +228,14 @@ class LiveMethod(eqx.Module):
         return _next(self.method, memory, *self._row(t, channels))
 
     def _row(self, t, channels: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
-        needs = self.method.needs
+        needs, channels = self.method.needs, as_mapping(channels, "channels")
         missing = [need.channel for need in needs if need.throughout and need.channel not in channels]
         if missing:
             raise InputError(f"row: no value for {', '.join(missing)}.")
         numbers = [channels.get(need.channel, np.nan) for need in needs]
-        t, *values = kit.scalar_row(t, numbers, dtype_of(self.method))
-        return t, dict(zip([need.channel for need in needs], values, strict=True))
+        names = tuple(need.channel for need in needs)
+        t, *values = kit.scalar_row(t, numbers, dtype_of(self.method), names)
+        return t, dict(zip(names, values, strict=True))
 
 
 @eqx.filter_jit

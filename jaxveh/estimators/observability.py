@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check_kind
+from jaxveh._core.errors import InputError, check_flags, check_kind
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Observability, observability_at
 from jaxveh.statespace import Row, StateSpace, kit
@@ -40,6 +40,7 @@ def observe(model: StateSpace, recording: Recording, known_start: bool = True) -
     Of the measurements only their presence is used, not their values. `known_start=False` adds the start states as unknowns
     with the prior's spread. **Raises** `InputError` for a model without parameters.
     """
+    check_flags(known_start=known_start)
     kit.check_model("observe", model)
     if model.chosen is None:
         raise InputError("observability: the model estimates no parameter; give `estimate=` or `with_parameters`.")

@@ -14,7 +14,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning, check_one_of, is_concrete
+from jaxveh._core.errors import InputError, JaxvehWarning, check_flags, check_one_of, is_concrete
 from jaxveh._core.parameter import pick, prior_spread
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
@@ -296,6 +296,7 @@ def estimate(
     `method`: a name of `METHODS`. Then `source` is a car's file, or a method with numbers of one's own, and the result is the
     `Answers` of that method, looking back only; it uses its own filter, and nothing is smoothed. **Raises** as `follow` does.
     """
+    check_flags(smoothed=smoothed)
     if method is not None or isinstance(source, AbstractMethod):
         _check_alone(filter, key)
         return follow(NAME, method_of(NAME, METHODS, source, method or RECOMMENDED), recording)

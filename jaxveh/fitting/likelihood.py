@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jax import lax
 
-from jaxveh._core.errors import check_key
+from jaxveh._core.errors import check_flags, check_key
 from jaxveh._core.parameter import Parameter, Where, pick, strong
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, Gradient, scan
@@ -130,6 +130,7 @@ def maximum_likelihood(
     **Returns** a `Fit` whose `model` has the new values; standard errors from the Hessian at the optimum.
     **Raises** `InputError` as `run` and `solve` do; `FilterError` if the solver does not converge, unless `throw=False`.
     """
+    check_flags(standard_errors=standard_errors, throw=throw)
     problem = pose_likelihood(filter, model, recordings, where, prior=prior, key=key)
     fit = solve(problem, max_steps=max_steps, tolerance=tolerance, standard_errors=standard_errors)
     if throw:

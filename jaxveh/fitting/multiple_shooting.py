@@ -12,7 +12,7 @@ import numpy as np
 import optimistix as optx
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check_kind, check_positive, is_concrete
+from jaxveh._core.errors import InputError, check_flags, check_kind, check_positive, is_concrete
 from jaxveh._core.parameter import Parameter, Where, pick, put, strong
 from jaxveh._core.recording import Recording
 from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, scalar_parameters
@@ -182,6 +182,7 @@ def multiple_shooting(
     for a model without parameters, logs too short, or `max_steps` below one; `FilterError` if the solver does not converge
     (`throw`).
     """
+    check_flags(standard_errors=standard_errors, throw=throw)
     problem = pose_shooting(model, cut(model, recordings, window), where, prior=prior, tie=tie)
     fit = solve(problem, max_steps=max_steps, tolerance=tolerance, standard_errors=standard_errors)
     if throw:

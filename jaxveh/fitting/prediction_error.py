@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 
-from jaxveh._core.errors import InputError, check_kind, check_positive, check_whole, is_concrete
+from jaxveh._core.errors import InputError, check_flags, check_kind, check_positive, check_whole, is_concrete
 from jaxveh._core.parameter import Parameter, Where, pick, strong
 from jaxveh._core.progress import Progress, check_progress, silent
 from jaxveh._core.recording import Recording
@@ -231,6 +231,7 @@ def prediction_error(
     whitened innovations, recordings of different length, or `max_steps` below one; `FilterError` if it does not converge
     (`throw`).
     """
+    check_flags(throw=throw)
     check_positive("tolerance", tolerance)
     check_whole("max_steps", max_steps)
     check_progress(progress)

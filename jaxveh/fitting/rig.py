@@ -15,6 +15,7 @@ from jaxveh._core.errors import (
     FilterError,
     InputError,
     check_at_least,
+    check_flags,
     check_kind,
     check_one_of,
     check_positive,
@@ -136,7 +137,7 @@ def fit_rig(
     forces, too few rows, rows in which no slip varies, bad `folds` or `max_steps`;
     `FilterError` if the joint fit does not converge, unless `throw=False`.
     """
-    _check_settings(max_steps, tolerance, folds, progress)
+    _check_settings(max_steps, tolerance, folds, progress, robust=robust, staged=staged, throw=throw)
     data, plan, aside = _prepare(law, rig, where, free, prior, measured, weights, bounds, robust, max_steps, tolerance)
     parts = fold_of(rig, folds) if folds else np.full(rig.load.shape, -1)
     joint = _joint(data)
@@ -159,7 +160,8 @@ def fit_rig(
     return _result(data, tyre, joint, settled.held, tuple(reports), data.rmse(law), validation)
 
 
-def _check_settings(max_steps: int, tolerance: float, folds: int, progress: Progress) -> None:
+def _check_settings(max_steps: int, tolerance: float, folds: int, progress: Progress, **flags: Any) -> None:
+    check_flags(**flags)
     check_at_least("max_steps", max_steps, 1)
     check_at_least("tolerance", tolerance, 0)
     check_whole("folds", folds, 0)
@@ -194,6 +196,7 @@ def pose_rig(
     `noise`: standard deviations by channel; by default those of the law's own residuals, so that a problem at a fitted law has
     the noise of the fit. Other arguments and errors as in `fit_rig`.
     """
+    check_flags(robust=robust)
     data, _, aside = _prepare(law, rig, where, free, prior, measured, weights, bounds, robust)
     levels = data.noise(law) if noise is None else dict(as_pairs(noise, "noise"))
     check_names("noise", levels, data.channels)

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jaxveh._core.errors import check_at_least, check_kind, check_whole
+from jaxveh._core.errors import InputError, check_at_least, check_finite, check_flags, check_kind, check_whole
 from jaxveh._core.result import Result, code
 from jaxveh.fitting.problem import AbstractProblem, SearchEnd, by_name, in_units
 from jaxveh.fitting.result import Fit
@@ -30,13 +30,26 @@ def solve(
     `start`: coordinates (n,), by default the problem's own; the optimum does not depend on it, and has no derivative with
     respect to it. `tolerance`: of the problem's solver. Without `standard_errors` they are NaN.
 
-    **Returns** a `Fit`; its `result` states how it ended. **Raises** `InputError` for `max_steps` below one.
+    **Returns** a `Fit`; its `result` states how it ended. **Raises** `InputError` for `max_steps` below one, and a `start` of
+    another shape or that is not finite.
     """
+    check_flags(standard_errors=standard_errors)
     check_kind("problem", problem, AbstractProblem, "fitting.pose_shooting, pose_likelihood and their like make one.")
     check_whole("max_steps", max_steps)
     check_at_least("tolerance", tolerance, 0)
+    if start is not None:
+        start = _coordinates(problem, start)
     # As an array, so that another tolerance does not compile another program.
     return _solve(problem, start, jnp.asarray(tolerance), max_steps=max_steps, standard_errors=standard_errors)
+
+
+def _coordinates(problem: AbstractProblem, start):
+    """The start as an array of the kind of the problem's own."""
+    check_finite("start", start)
+    own = jax.eval_shape(problem.start)
+    if jnp.shape(start) != own.shape:
+        raise InputError(f"start has shape {jnp.shape(start)}: must be {own.shape}, as that of problem.start() is.")
+    return jnp.asarray(start, own.dtype)
 
 
 @eqx.filter_jit

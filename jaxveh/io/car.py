@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_one_of, path_of
+from jaxveh._core.errors import InputError, check, check_flags, check_one_of, path_of
 from jaxveh.io.car_table import CarTable
 from jaxveh.io.files import write_text
 from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text
@@ -236,6 +236,7 @@ def write_car(car: CarSpecification, path: str | os.PathLike, *, note: str = "",
 
     The file is written completely or not at all. **Raises** `InputError` if it exists and `overwrite` is False.
     """
+    check_flags(overwrite=overwrite)
     lines = [f"# {line}".rstrip() for line in note.splitlines()]
     write_text("\n".join(lines + car_lines(car)) + "\n", path, overwrite)
 

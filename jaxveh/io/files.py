@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from jaxveh._core.errors import InputError, did_you_mean, path_of
+from jaxveh._core.errors import InputError, check_flags, did_you_mean, path_of
 
 
 def check_readable(path: Path) -> None:
@@ -49,6 +49,7 @@ def replacing_file(path: str | os.PathLike, overwrite: bool = False) -> Iterator
 
     **Raises** `InputError` if `path` exists and `overwrite` is False, or the system refuses to write.
     """
+    check_flags(overwrite=overwrite)
     path = path_of(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file.")
@@ -86,6 +87,7 @@ def making_folder(path: str | os.PathLike) -> Iterator[Path]:
 
 def write_text(text: str, path: str | os.PathLike, overwrite: bool = False) -> None:
     """Write a text file in UTF-8, completely or not at all."""
+    check_flags(overwrite=overwrite)
     with replacing_file(path, overwrite) as part:
         part.write_text(text, encoding="utf-8", newline="\n")
 

@@ -8,7 +8,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_flags
 from jaxveh._core.names import as_mapping
 from jaxveh._core.recording import Recording, check_recording
 from jaxveh.io.canonical import canonical_unit
@@ -101,6 +101,7 @@ def write_frame(frame: Any, path: str | os.PathLike, *, overwrite: bool = False)
     Units and note are those of `frame.attrs`, as `to_frame` sets them. **Raises** `InputError` like `write_recording`,
     and for a frame without `time` or with columns that are not numbers.
     """
+    check_flags(overwrite=overwrite)
     if "time" not in frame.columns:
         raise InputError(f"write_frame: no column `time`; there are: {', '.join(map(str, frame.columns))}.")
     columns = {str(name): numeric(frame[name].to_numpy(), f"write_frame: column {name!r}") for name in frame.columns}

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, path_of
+from jaxveh._core.errors import InputError, check_flags, path_of
 from jaxveh.io.files import check_suffix, replacing_file
 from jaxveh.io.log import numeric
 from jaxveh.io.optional import require
@@ -32,6 +32,7 @@ def write_topics(topics: Mapping[str, Any], path: str | os.PathLike, *, overwrit
     **Raises** `InputError` for another suffix, no topic, a frame without `time` or with columns that are not numbers, times that
     cannot be time stamps, or if the file exists and `overwrite` is False.
     """
+    check_flags(overwrite=overwrite)
     path = path_of(path)
     check_suffix(path, (MCAP_SUFFIX,), "recording of topics")
     writing = require("mcap.writer", "writing MCAP", "mcap")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from jaxveh._core.errors import InputError, path_of
+from jaxveh._core.errors import InputError, check_flags, path_of
 from jaxveh.io.decimals import decimal
 from jaxveh.io.files import check_readable, replacing_file
 
@@ -212,6 +212,7 @@ def write_property_file(file: PropertyFile, path: str | Path, *, overwrite: bool
 
     **Raises** `InputError` if the file exists and `overwrite` is not set.
     """
+    check_flags(overwrite=overwrite)
     with (
         replacing_file(path, overwrite) as part,
         open(part, "w", encoding="utf-8", errors="surrogateescape", newline="") as out,

@@ -11,7 +11,7 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning, path_of
+from jaxveh._core.errors import InputError, JaxvehWarning, check_flags, path_of
 from jaxveh._core.recording import Recording, check_recording
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
@@ -168,6 +168,7 @@ def write_recording(recording: Recording, path: str | os.PathLike, *, overwrite:
     The file is written completely or not at all. **Raises** `InputError` for another suffix, or if the file exists and
     `overwrite` is False.
     """
+    check_flags(overwrite=overwrite)
     check_recording("write_recording", recording)
     columns = {name: np.asarray(values) for name, values in recording.channels.items()}
     write_columns(path, np.asarray(recording.time), columns, dict(recording.units), recording.source, overwrite)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from jaxveh._core.errors import path_of
+from jaxveh._core.errors import check_flags, path_of
 from jaxveh._core.labelled import Labelled
 from jaxveh._core.recording import Recording
 from jaxveh.io.datasets import result_of
@@ -24,6 +24,7 @@ RESULT_SUFFIXES = tuple(_WRITE)
 
 def save_result(result: Any, path: str | os.PathLike, overwrite: bool = False) -> None:
     """Write a result as `.nc` or `.parquet`, completely or not at all; a recording in any format of `write_recording`."""
+    check_flags(overwrite=overwrite)
     path = path_of(path)
     if isinstance(result, Recording) and result.time.ndim == 1:
         write_recording(result, path, overwrite=overwrite)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import InputError, check_flags, check_positive
 from jaxveh._core.names import as_mapping, as_names, check_names
 from jaxveh._core.recording import Recording
 from jaxveh.plots.quantities import quantity
@@ -73,6 +73,7 @@ def estimate(
     **Returns** the figure. **Raises** `InputError` for unknown quantities, a truth of another length, or `seconds` that are not
     positive.
     """
+    check_flags(errors=errors)
     labelled = dict(estimates) if isinstance(estimates, Mapping) else {"estimate": estimates}
     if not labelled:
         raise InputError("plots.estimate: no estimate to show; give at least one.")

@@ -8,7 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_one_of
+from jaxveh._core.errors import InputError, check_flags, check_one_of
 from jaxveh.plots.style import COLOURS, colour, legend, new_figure, style
 from jaxveh.plots.tyres import check_tyre
 from jaxveh.tyres import Contact
@@ -34,6 +34,7 @@ def force_curves(
 
     **Returns** the figure. **Raises** `InputError` if an axle's slips are missing.
     """
+    check_flags(errors=errors)
     for axle in AXLES:
         check_one_of("axle", axle, tuple(slips))
     for label, car in cars.items():

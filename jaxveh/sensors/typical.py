@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from jaxveh._core.errors import check_flags
 from jaxveh.sensors.gnss import GNSS
 from jaxveh.sensors.imu import IMU
 from jaxveh.sensors.low_pass import LowPass
@@ -39,6 +40,7 @@ def production_car(
 
     `gnss=False` leaves out satellite navigation.
     """
+    check_flags(gnss=gnss)
     wheels = () if wheel_radius is None else (_wheels(wheel_radius),)
     satellites = (_satellites(),) if gnss else ()
     return Suite((_esc(), _steering(steering_ratio), *wheels, *satellites))

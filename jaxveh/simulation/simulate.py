@@ -14,6 +14,7 @@ from jaxveh._core.errors import (
     FilterError,
     InputError,
     JaxvehWarning,
+    check_flags,
     check_key,
     check_kind,
     check_one_of,
@@ -107,6 +108,7 @@ def simulate(
     car needs, rows that coincide in the car's dtype; `FilterError`, with time, state and a remedy, if the motion does not stay
     finite (with `throw`, and not under jit: check the channels there).
     """
+    check_flags(throw=throw)
     sensors = _suite_of(sensors)
     _check_asked(until, key, adjoint, progress)
     driven = driven_car(car, manoeuvre, sensors if isinstance(sensors, SensorSet) else None, road)

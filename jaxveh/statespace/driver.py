@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import FilterError, JaxvehWarning, check_one_of, is_concrete
+from jaxveh._core.errors import FilterError, JaxvehWarning, check_flags, check_one_of, is_concrete
 from jaxveh._core.estimated import Estimated
 from jaxveh._core.fresh_functions import note_function
 from jaxveh._core.names import as_names
@@ -98,6 +98,7 @@ def run(
     reason if the filter failed, and **warns** (`JaxvehWarning`) if it went on but has remarks on rows (`info.remark`), and if
     rows are too far apart for the steps between them, unless `throw=False`.
     """
+    check_flags(throw=throw)
     model = strong(model)
     check_told(filter, model)
     filter.check(model)

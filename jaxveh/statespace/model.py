@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, float_array, is_concrete
+from jaxveh._core.errors import InputError, check_numbers, check_single, float_array, is_concrete
 from jaxveh._core.names import check_names, record
 from jaxveh._core.parameter import UNNAMED
 from jaxveh._core.recording import Recording, check_recording, gap_to_fill, time_for
@@ -184,7 +184,7 @@ class StateSpace(eqx.Module):
         if missing:
             raise InputError(f"row: no value for the input(s) {', '.join(missing)}.")
         numbers = [*(u[name] for name in self.inputs), *(y.get(name, np.nan) for name in self.channels)]
-        t, *others = scalar_row(t, numbers, dtype)
+        t, *others = scalar_row(t, numbers, dtype, (*self.inputs, *self.channels))
         inputs = record("Inputs", dict(zip(self.inputs, others, strict=False)))
         measured = record("Measurements", dict(zip(self.channels, others[len(self.inputs) :], strict=True)))
         return Row(t, inputs, measured)
@@ -227,18 +227,29 @@ def _describe(value: Any) -> str:
     return f"a {type(value).__name__}" if fields is None else f"a NamedTuple with {', '.join(fields)}"
 
 
-def scalar_row(t, numbers: list, dtype) -> tuple:
-    """A row's time (s) and numbers as scalars of a dtype, for a live loop.
+def scalar_row(t, numbers: list, dtype, names: tuple[str, ...]) -> tuple:
+    """A row's time (s) and numbers, each with its name, as scalars of a dtype, for a live loop.
 
-    **Raises** `InputError` for a time that the dtype resolves too coarsely.
+    **Raises** `InputError` for a time that is not finite or that the dtype resolves too coarsely, and what is no number.
     """
     _check_stamp(t, dtype)
-    return _scalars([t, *numbers], dtype)
+    try:
+        return _scalars([t, *numbers], dtype)
+    except (TypeError, ValueError):
+        for name, number in zip(names, numbers, strict=True):
+            check_numbers(f"row: {name}", np.nan if number is None else number)
+        raise
 
 
 def _check_stamp(t, dtype) -> None:
-    """Raise `InputError` for a time so large that no digits are left for a step."""
-    if is_concrete(t) and np.isfinite(t) and np.spacing(np.abs(np.asarray(t, dtype))) > COARSEST:
+    """Raise `InputError` for a time so large that no digits are left for a step, and for one that is no finite number."""
+    if not is_concrete(t):
+        return
+    if type(t) is not float:
+        check_single(**{"row: t": t})
+    if not np.isfinite(t):
+        raise InputError(f"row: t = {t}: must be finite (s), in every row.")
+    if np.spacing(np.abs(np.asarray(t, dtype))) > COARSEST:
         raise InputError(
             f"row: t = {float(t)} s has a resolution of {float(np.spacing(np.asarray(t, dtype))):.3g} s in "
             f"{np.dtype(dtype).name}: count time from the first row, or use float64."

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, path_of
+from jaxveh._core.errors import InputError, check_flags, path_of
 from jaxveh.io import kit, write_text
 from jaxveh.tyres.arctangent import Arctangent
 from jaxveh.tyres.base import AbstractTyre
@@ -38,12 +38,12 @@ MODELS: dict[str, type[AbstractTyre]] = {
 def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", overwrite: bool = False) -> None:
     """Write a tyre's parameters as TOML, in SI units and radians; `note` is a comment at its top.
 
-    The file has one table `[tyre]` with `model`, the law's name, and a number for each parameter (a string for an option).
-    Parameters that are None are left out.
+    Its one table `[tyre]` has `model`, the law's name, and a number for each parameter that is not None (a string for an option).
 
     **Raises** `InputError` for a law that is not in `MODELS`, parameters that are not finite scalars, or an existing file without
     `overwrite`.
     """
+    check_flags(overwrite=overwrite)
     name = type(tyre).__name__
     if MODELS.get(name) is not type(tyre):
         raise InputError(

@@ -9,7 +9,7 @@ from typing import Literal, overload
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_one_of
+from jaxveh._core.errors import InputError, check_flags, check_one_of
 from jaxveh.io import PropertyFile, read_property_file
 from jaxveh.tyres.mf_tyre import (
     AligningCoefficients,
@@ -93,6 +93,7 @@ def from_property_file(
     **Raises** `InputError` for an unknown version, a coefficient of the tyre that is not a finite number (entries that the
     tyre does not use may have any value), a required coefficient that is missing, and a `side` if the file has no TYRESIDE.
     """
+    check_flags(limits=limits, angles=angles, spins=spins)
     file = source if isinstance(source, PropertyFile) else read_property_file(source)
     tyre = _as_it_is(file, limits, angles, spins)
     if side is None:

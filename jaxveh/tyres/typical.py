@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from jaxveh._core.errors import check_positive
+from jaxveh._core.errors import check_flags, check_positive
 from jaxveh.tyres import mf_tyre
 from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.mf_tyre.typical import TYPICAL_COEFFICIENTS
@@ -24,6 +24,7 @@ def typical_mf_tyre(
 
     **Raises** `InputError` for numbers that are not positive, and for an unknown version.
     """
+    check_flags(limits=limits)
     for name, value, unit in (
         ("load", load, "N"), ("pressure", pressure, "Pa"), ("radius", radius, "m"), ("speed", speed, "m/s"),
     ):  # fmt: skip

@@ -180,10 +180,14 @@ CARS_OF_BOTH_KINDS = {
 def test_what_is_around_a_car_has_its_precision(kind, dtype):
     car, other = cast(CARS_OF_BOTH_KINDS[kind](), dtype), np.float64 if dtype == np.float32 else np.float32
     pedals = kind == "driven"
-    drives = [(manoeuvres.named_manoeuvre(n, 20.0), None) for n, m in manoeuvres.MANOEUVRES.items() if pedals or not m.pedals]
+    drives = [
+        (manoeuvres.named_manoeuvre(n, 20.0), None) for n, m in manoeuvres.MANOEUVRES.items() if pedals or not m.pedals
+    ]
     drives += [(STEER, roads.named_road(name)) for name in roads.ROADS]
     for manoeuvre, road in cast(drives, other):
         driven = simulation.driven_car(car, manoeuvre, cast(sensors.esc(low_pass=sensors.LowPass(20.0)), other), road)
         start = driven.start(0.0, dtype)
-        rates, (u, *seen) = jax.eval_shape(lambda x, d=driven: (d.derivatives(jnp.zeros((), dtype), x), d.see(0.0, x)), start)
+        rates, (u, *seen) = jax.eval_shape(
+            lambda x, d=driven: (d.derivatives(jnp.zeros((), dtype), x), d.see(0.0, x)), start
+        )
         assert {leaf.dtype for leaf in jax.tree.leaves((start, rates, seen))} == {np.dtype(dtype)}, (manoeuvre, road, u)

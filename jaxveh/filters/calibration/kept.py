@@ -8,6 +8,7 @@ from typing import Any
 
 import equinox as eqx
 
+from jaxveh._core.errors import check_flags
 from jaxveh._core.fresh_functions import note_function
 from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
@@ -24,6 +25,7 @@ def run_and_keep(
     For example `lambda belief: belief.covariance`, or the belief's `ancestors`. Each new lambda compiles anew.
     **Raises** as `run`.
     """
+    check_flags(throw=throw)
     model = strong(model)
     kit.check_told(filter, model)
     filter.check(model)

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_key, check_positive, check_whole
+from jaxveh._core.errors import InputError, check_flags, check_key, check_positive, check_whole
 from jaxveh._core.parameter import strong
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
@@ -71,6 +71,7 @@ def log_likelihood_spread(
 
     **Raises** `InputError` where the arguments do not agree or the filter draws nothing; `FilterError` where runs fail.
     """
+    check_flags(throw=throw)
     check_whole("runs", runs, 2)
     check_key("log_likelihood_spread", key)
     model = strong(model)

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from jaxveh._core.errors import FilterError, check_key, check_whole
+from jaxveh._core.errors import FilterError, check_flags, check_key, check_whole
 from jaxveh._core.parameter import strong
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
@@ -61,6 +61,7 @@ def monte_carlo(
     **Raises** `InputError` where filter, model, truth and schedule do not agree; `FilterError` where runs fail, unless
     `throw=False`.
     """
+    check_flags(throw=throw)
     model, truth = strong(model), strong(model if truth is None else truth)
     check_whole("runs", runs)
     check_key("monte_carlo", key)
@@ -68,9 +69,8 @@ def monte_carlo(
     kit.check_covariance("monte_carlo", filter)
     filter.check(model)
     rows = kit.schedule_rows(truth, schedule)
-    found = in_batches(
-        lambda keys: _runs(filter, model, truth, rows, keys), key, runs, batch, progress, "Monte Carlo runs"
-    )
+    drawn = lambda keys: _runs(filter, model, truth, rows, keys)
+    found = in_batches(drawn, key, runs, batch, progress, "Monte Carlo runs")
     found = Runs(np.asarray(schedule.time), *found)
     if throw:
         raise_failed(filter, found.result)

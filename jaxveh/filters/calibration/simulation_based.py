@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_key, check_whole, is_whole
+from jaxveh._core.errors import InputError, check, check_flags, check_key, check_whole, is_whole
 from jaxveh._core.parameter import strong
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
@@ -80,6 +80,7 @@ def simulation_based_calibration(
 
     **Arguments**: as `monte_carlo`. **Raises** likewise.
     """
+    check_flags(throw=throw)
     model, truth = strong(model), strong(model if truth is None else truth)
     check_whole("runs", runs)
     check_key("simulation_based_calibration", key)

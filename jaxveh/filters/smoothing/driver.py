@@ -6,7 +6,7 @@ from typing import Any
 
 import equinox as eqx
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_flags
 from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
 from jaxveh.filters.particle import AbstractParticleFilter
@@ -40,6 +40,7 @@ def smooth(
     **Raises** as `run`, and `InputError` if the method does not suit the filter or the model, or if the filter's class
     does not declare that it can be smoothed (`AbstractFilter.smooths`).
     """
+    check_flags(throw=throw)
     model = strong(model)
     kit.check_told(filter, model)
     filter.check(model)

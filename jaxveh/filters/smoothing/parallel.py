@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_flags
 from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import first_failure
@@ -36,6 +36,7 @@ def smooth_parallel(
     **Raises** as `run`, and `InputError` for filters that do not support it (`linearisations` is None) and forms that
     do not store the covariance.
     """
+    check_flags(throw=throw)
     declared = kit.smoothing_of(filter) is Smoothing.gaussian
     if not declared or filter.linearisations is None or not kit.innermost(filter).form.keeps_matrix:
         raise InputError(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from jaxveh._core.errors import InputError, check, check_finite, check_positive
+from jaxveh._core.errors import InputError, check, check_finite, check_flags, check_positive
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.steering import AbstractSteering
 
@@ -116,6 +116,7 @@ class CarNumbers:
         ):  # fmt: skip
             if getattr(self, name) is not None:
                 check_positive(f"{self.name}: {name}", getattr(self, name))
+        check_flags(**{f"{self.name}: four_motors": self.four_motors})
         for name in ("front_drive", "front_brake"):
             check(f"{self.name}: {name}", getattr(self, name), lambda v: (v >= 0) & (v <= 1), "between 0 and 1")
         for name in ("drag", "rolling_resistance"):
@@ -139,6 +140,7 @@ class CarNumbers:
     def values(self, sprung: bool = False) -> dict[str, Any]:
         """All known numbers by the names of the vehicles' parameters. With `sprung` the position and the inertias are those of
         the sprung mass instead of the whole car. Axle stiffnesses are twice those of a tyre."""
+        check_flags(sprung=sprung)
         found = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         found |= {"wheelbase": self.wheelbase}
         for axle in ("front", "rear"):
