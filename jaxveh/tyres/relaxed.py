@@ -24,9 +24,9 @@ from jaxveh.tyres.base import (
 from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.slip import practical
 
-LEAST_LENGTH = 0.025
-"""The lower bound of a tyre's own relaxation lengths, m: they vanish with the load, and the pole of the lag is proportional to
-1 / length."""
+LEAST_SHARE = 5 / 64
+"""The lower bound of a tyre's own relaxation lengths over its unloaded radius (2.5 cm of a passenger car's wheel): they vanish with
+the load, and the pole of the lag is proportional to 1 / length."""
 
 SLIDES = 0.1
 """The limit of the slip of a sliding tyre's deflections at standstill (-): about the slip at which forces are greatest."""
@@ -57,7 +57,7 @@ class Relaxed(AbstractDynamicTyre):
     sliding at the static law's slip.
 
     A direction without a length has no lag and no state. If both lengths are None, an `MFTyre` uses its own,
-    `outputs(contact).sigma_x` and `.sigma_y` (at least `LEAST_LENGTH`), at the contact's load. `start` is the steady state at
+    `outputs(contact).sigma_x` and `.sigma_y` (at least `LEAST_SHARE` of its radius), at the contact's load. `start` is the steady state at
     the contact's slips. Below a vehicle's crawl speed these are smaller than v_s / |v|, and the state moves on from there. The
     fastest pole is `-V / sigma`: RK4 needs steps below `2.78 sigma / V` (2.3 ms at 60 m/s with 0.05 m).
 
@@ -145,4 +145,5 @@ class Relaxed(AbstractDynamicTyre):
         if not (self.own and isinstance(self.tyre, MFTyre)):
             return {"x": self.sigma_x, "y": self.sigma_y}
         found = self.tyre.outputs(contact)
-        return {"x": jnp.maximum(found.sigma_x, LEAST_LENGTH), "y": jnp.maximum(found.sigma_y, LEAST_LENGTH)}
+        least = LEAST_SHARE * self.tyre.structure.UNLOADED_RADIUS
+        return {"x": jnp.maximum(found.sigma_x, least), "y": jnp.maximum(found.sigma_y, least)}

@@ -68,7 +68,7 @@ def test_forces_lag_over_the_way_and_moments_do_not(name):
 
 
 @pytest.mark.parametrize("load", [4000.0, 30.0])
-def test_mf_tyre_lags_over_its_own_lengths_but_not_less_than_25_mm(load):
+def test_mf_tyre_lags_over_its_own_lengths_but_not_less_than_25_mm_of_a_wheel_of_320_mm(load):
     tyre = tyres.typical_mf_tyre(4000.0)
     at = contact_at("rolls", load=load)
     own = tyre.outputs(at)
