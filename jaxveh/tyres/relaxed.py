@@ -25,8 +25,8 @@ from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.slip import practical
 
 LEAST_SHARE = 5 / 64
-"""The lower bound of a tyre's own relaxation lengths over its unloaded radius (2.5 cm of a passenger car's wheel): they vanish with
-the load, and the pole of the lag is proportional to 1 / length."""
+"""The lower bound of a tyre's own relaxation lengths over its unloaded radius (2.5 cm for a wheel of 32 cm): they vanish with the
+load, and the pole of the lag is proportional to 1 / length."""
 
 SLIDES = 0.1
 """The limit of the slip of a sliding tyre's deflections at standstill (-): about the slip at which forces are greatest."""
@@ -57,9 +57,9 @@ class Relaxed(AbstractDynamicTyre):
     sliding at the static law's slip.
 
     A direction without a length has no lag and no state. If both lengths are None, an `MFTyre` uses its own,
-    `outputs(contact).sigma_x` and `.sigma_y` (at least `LEAST_SHARE` of its radius), at the contact's load. `start` is the steady state at
-    the contact's slips. Below a vehicle's crawl speed these are smaller than v_s / |v|, and the state moves on from there. The
-    fastest pole is `-V / sigma`: RK4 needs steps below `2.78 sigma / V` (2.3 ms at 60 m/s with 0.05 m).
+    `outputs(contact).sigma_x` and `.sigma_y` at the contact's load, at least `LEAST_SHARE` of its unloaded radius. `start` is the
+    steady state at the contact's slips. Below a vehicle's crawl speed these are smaller than v_s / |v|, and the state moves on
+    from there. The fastest pole is `-V / sigma`: RK4 needs steps below `2.78 sigma / V` (2.3 ms at 60 m/s with 0.05 m).
 
     **Raises** `InputError` for lengths that are not positive, no lengths for a tyre without its own, a tyre with states, an
     unknown `of`, or (`derivatives`) a contact without a speed.
