@@ -35,6 +35,13 @@ VERSION_OF_FITTYP = {5: 52, 6: 52, 21: 52, 52: 52, 60: 61, 61: 61, 62: 62}
 OLD_FORMATS = ("PAC2002", "MF_05", "MF-TYRE", "MF_TYRE")
 """The values of PROPERTY_FILE_FORMAT of files that need no FITTYP: their equations are those of version 5.2."""
 
+OTHER_LAWS = {
+    "FIALA": "Fiala", "UA": "University of Arizona", "521": "5.2.1", "PAC89": "Pacejka '89", "PAC94": "Pacejka '94",
+    "PACTIME": "PAC-TIME", "PACMC": "motorcycle", "FTIRE": "FTire", "CDTIRE": "CDTire", "RMODK": "RMOD-K",
+}  # fmt: skip
+"""The letters and digits of PROPERTY_FILE_FORMAT in files of other laws, and the laws. Some of them have coefficients with the
+names of MF-Tyre and another meaning (the camber of a motorcycle's tyre)."""
+
 NEEDED = ("FNOMIN", "UNLOADED_RADIUS", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
 """The required coefficients; `TYPICAL_COEFFICIENTS` has the defaults of the others."""
 
@@ -90,8 +97,9 @@ def from_property_file(
     are those of `TYPICAL_COEFFICIENTS`, or zero. An entry without a value counts as missing, and so does a zero in
     `NOT_MEASURED`; `check_property_file` reports both.
 
-    **Raises** `InputError` for an unknown version, a coefficient of the tyre that is not a finite number (entries that the
-    tyre does not use may have any value), a required coefficient that is missing, and a `side` if the file has no TYRESIDE.
+    **Raises** `InputError` for an unknown version, a file of another law (`OTHER_LAWS`), a coefficient of the tyre that is not a
+    finite number (entries that the tyre does not use may have any value), a required coefficient that is missing, and a `side`
+    if the file has no TYRESIDE.
     """
     check_flags(limits=limits, angles=angles, spins=spins)
     file = source if isinstance(source, PropertyFile) else read_property_file(source)
@@ -114,6 +122,7 @@ def side_of(file: PropertyFile) -> str:
 
 
 def _as_it_is(file: PropertyFile, limits: bool, angles: bool, spins: bool) -> MFTyre:
+    _refuse_other_laws(file)
     for key in NEEDED:
         file.number(key)
     size = {key: size_of(file, powers) for key, powers in DIMENSIONS.items()}
@@ -142,6 +151,16 @@ def _as_it_is(file: PropertyFile, limits: bool, angles: bool, spins: bool) -> MF
     )
 
 
+def _refuse_other_laws(file: PropertyFile) -> None:
+    said = file.text("PROPERTY_FILE_FORMAT").strip()
+    law = OTHER_LAWS.get("".join(letter for letter in said.upper() if letter.isalnum()))
+    if law is not None:
+        raise InputError(
+            f"{file.source}: PROPERTY_FILE_FORMAT = {said!r}: a tyre of the {law} law; only files of MF-Tyre 5.2 to 6.2 are read. "
+            "Fit an MF-Tyre to this tyre's forces (jaxveh tyre fit), or write its numbers into a law of jaxveh.tyres."
+        )
+
+
 def version_of(file: PropertyFile) -> int:
     """The version of the equations: 52, 61 or 62. **Raises** `InputError` for other versions, and if the file has none."""
     entry = file.find("FITTYP")
@@ -155,7 +174,7 @@ def version_of(file: PropertyFile) -> int:
     if kind not in OLD_FORMATS:
         raise InputError(
             f"{file.source}: neither FITTYP nor a PROPERTY_FILE_FORMAT of {', '.join(OLD_FORMATS)} (it is {kind!r}); "
-            "add FITTYP = 61 (or 52, 62) to [MODEL]."
+            "if it is an MF-Tyre, add FITTYP = 61 (or 52, 62) to [MODEL]."
         )
     return 52
 

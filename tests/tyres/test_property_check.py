@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from shared_data import shared, shared_names
 
-from jaxveh import tyres
+from jaxveh import InputError, tyres
 from jaxveh.io.property_file import parse_property_file
-from jaxveh.tyres import Contact, property_check
+from jaxveh.tyres import Contact, property_check, property_file
 
 GOOD = """\
 [UNITS]
@@ -284,3 +284,20 @@ def test_real_files_do_not_drown_in_alarms(name):
         "chrono__Polaris__Polaris_Pac02Tire.tir": {"scaling", "REX1, REX2"},
     }
     assert odd.get(name, set()) <= {finding.about for finding in findings}
+
+
+@pytest.mark.parametrize("version", ["", "FITTYP = 61"])
+@pytest.mark.parametrize("written", ["{}", "{}_", "{} "])
+def test_a_file_of_another_law_is_refused_by_its_name(version, written):
+    """Whatever it lacks, and even if it has all coefficients of MF-Tyre: those of a motorcycle have the same names."""
+    for name, law in property_file.OTHER_LAWS.items():
+        told = f"{version}\nPROPERTY_FILE_FORMAT = '{written.format(name[:3])}{name[3:].lower()}'"
+        for text in (GOOD.replace("FITTYP = 61", told), f"[MODEL]\n{told}\n"):
+            with pytest.raises(InputError, match=f"PROPERTY_FILE_FORMAT = .*: a tyre of the {re.escape(law)} law; only"):
+                tyres.from_property_file(parse_property_file(text))
+
+
+@pytest.mark.parametrize("name", [*property_file.OLD_FORMATS, "USER", "MF-SWIFT", "PAC2002"])
+def test_the_names_of_mf_tyre_are_those_of_no_other_law(name):
+    told = GOOD.replace("FITTYP = 61", f"FITTYP = 61\nPROPERTY_FILE_FORMAT = '{name}'")
+    assert tyres.from_property_file(parse_property_file(told)).version == 61
