@@ -12,6 +12,9 @@ GAP = 2.5
 SLOWEST = 2.0
 """Step above which the motion of a car cannot be observed, s."""
 
+SLOW = 0.5
+"""Step of a whole log from which a warning asks for the unit of its time, s: the yaw of a car settles in less."""
+
 QUICKEST = 2e-5
 """Step below which no logger records a car's motion, s."""
 
@@ -63,7 +66,13 @@ def _raster(label: str, time: np.ndarray, missing: float) -> list[LogFinding]:
     values = {"rate": 1 / usual, "jitter": jitter, "missing": missing, "samples": float(time.size)}
     quiet = f" (missing in {missing:.0%} of the log's rows)" if missing else ""
     regular = LogFinding("ok", label, f"is sampled every {usual * 1e3:.4g} ms, {1 / usual:.4g} Hz{quiet}.", values)
-    if jitter > JITTER:
+    if label == "time" and usual >= SLOW:
+        words = (
+            f"has steps of {usual:.4g} s, in which a car's motion comes and goes unseen; does it count rows, or milliseconds of a "
+            "quick log? Then set its unit in the channel map; otherwise record at 10 Hz or more."
+        )
+        regular = LogFinding("warning", label, words, values)
+    elif jitter > JITTER:
         words = (
             f"is sampled at {1 / usual:.4g} Hz on average{quiet}, unevenly: the steps' standard deviation is {jitter:.0%} of the "
             "usual step."

@@ -156,7 +156,7 @@ def _refuse_other_laws(file: PropertyFile) -> None:
     law = OTHER_LAWS.get("".join(letter for letter in said.upper() if letter.isalnum()))
     if law is not None:
         raise InputError(
-            f"{file.source}: PROPERTY_FILE_FORMAT = {said!r}: a tyre of the {law} law; only files of MF-Tyre 5.2 to 6.2 are read. "
+            f"{file.source}: PROPERTY_FILE_FORMAT = {said!r}: a tyre of the {law} law; only MF-Tyre 5.2 to 6.2 is read. "
             "Fit an MF-Tyre to this tyre's forces (jaxveh tyre fit), or write its numbers into a law of jaxveh.tyres."
         )
 

@@ -499,6 +499,16 @@ def test_a_clock_in_another_unit_is_named(unit):
         assert bool(told) == ((unit, rate) not in DOUBTFUL), (unit, rate)
 
 
+@pytest.mark.parametrize("rate", [0.6, 1.0, 2.0, 5.0, 10.0, 1000.0])
+def test_steps_too_long_to_see_the_motion_ask_for_the_unit(rate):
+    """A count of rows, milliseconds at 1 kHz, or a logger of a fleet; a slow channel of a quicker log is not meant."""
+    time, speed = np.arange(200) / rate, 20 + np.sin(np.arange(200))
+    told = matching(findings(time, {"v_x": speed}), "warning", "time", "does it count rows")
+    assert bool(told) == (rate <= 2.0)
+    fine, seldom = np.arange(4000) / (20 * rate), np.where(np.arange(4000) % 20 == 0, np.repeat(speed, 20), np.nan)
+    assert not matching(findings(fine, {"v_x": np.repeat(speed, 20), "x": seldom}), "warning", "x", "does it count rows")
+
+
 @pytest.mark.parametrize("rate", [1.0, 10.0, 1000.0, 20_000.0])
 def test_a_clock_in_seconds_is_no_fault(rate):
     time = np.arange(200) / rate
