@@ -68,8 +68,8 @@ def _raster(label: str, time: np.ndarray, missing: float) -> list[LogFinding]:
     regular = LogFinding("ok", label, f"is sampled every {usual * 1e3:.4g} ms, {1 / usual:.4g} Hz{quiet}.", values)
     if label == "time" and usual >= SLOW:
         words = (
-            f"has steps of {usual:.4g} s, in which a car's motion comes and goes unseen; does it count rows, or milliseconds of a "
-            "quick log? Then set its unit in the channel map; otherwise record at 10 Hz or more."
+            f"has steps of {usual:.4g} s, in which a car's motion comes and goes unseen; does it count rows, or milliseconds of "
+            "a quick log? Then set its unit in the channel map; otherwise record at 10 Hz or more."
         )
         regular = LogFinding("warning", label, words, values)
     elif jitter > JITTER:

@@ -506,7 +506,9 @@ def test_steps_too_long_to_see_the_motion_ask_for_the_unit(rate):
     told = matching(findings(time, {"v_x": speed}), "warning", "time", "does it count rows")
     assert bool(told) == (rate <= 2.0)
     fine, seldom = np.arange(4000) / (20 * rate), np.where(np.arange(4000) % 20 == 0, np.repeat(speed, 20), np.nan)
-    assert not matching(findings(fine, {"v_x": np.repeat(speed, 20), "x": seldom}), "warning", "x", "does it count rows")
+    assert not matching(
+        findings(fine, {"v_x": np.repeat(speed, 20), "x": seldom}), "warning", "x", "does it count rows"
+    )
 
 
 @pytest.mark.parametrize("rate", [1.0, 10.0, 1000.0, 20_000.0])

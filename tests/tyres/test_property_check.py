@@ -293,7 +293,9 @@ def test_a_file_of_another_law_is_refused_by_its_name(version, written):
     for name, law in property_file.OTHER_LAWS.items():
         told = f"{version}\nPROPERTY_FILE_FORMAT = '{written.format(name[:3])}{name[3:].lower()}'"
         for text in (GOOD.replace("FITTYP = 61", told), f"[MODEL]\n{told}\n"):
-            with pytest.raises(InputError, match=f"PROPERTY_FILE_FORMAT = .*: a tyre of the {re.escape(law)} law; only"):
+            with pytest.raises(
+                InputError, match=f"PROPERTY_FILE_FORMAT = .*: a tyre of the {re.escape(law)} law; only"
+            ):
                 tyres.from_property_file(parse_property_file(text))
 
 
