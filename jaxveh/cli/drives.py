@@ -48,9 +48,12 @@ def read_drives(
 ) -> list[Drive]:
     """Read the logs, cut each to its span, fill gaps of inputs on request, and check each.
 
-    The warnings of `check` are printed. **Raises** `InputError` if it finds errors in channels that are `used`, or that an
-    estimator uses, unless `anyway` is set.
+    The warnings of `check` are printed. **Raises** `InputError` for a file that is named twice (a fit to it would seem surer than
+    it is), and if `check` finds errors in channels that are `used`, or that an estimator uses, unless `anyway` is set.
     """
+    files = [log.resolve() for log in logs]
+    if twice := [log for log, file in zip(logs, files, strict=True) if files.count(file) > 1]:
+        raise InputError(f"{twice[1]}: the log is named twice; name each log once.")
     drives = []
     for log in logs:
         recording = with_speed(log, _on_one_clock(log, _read(log, car, channels, span)), car)

@@ -13,7 +13,7 @@ from jaxveh.cli.blanking import calibration_part
 from jaxveh.cli.console import progress, results
 from jaxveh.cli.drives import Drive, read_drives
 from jaxveh.cli.estimate import print_fitted
-from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
+from jaxveh.cli.output import check_folders, check_product, check_report, make_folder, write_numbers
 from jaxveh.cli.vehicle import car_of
 from jaxveh.diagnostics import kit
 
@@ -59,6 +59,7 @@ def fit(
     if car_file is not None and car_file.resolve() == product.resolve():
         raise InputError(f"--car-file {car_file}: is the file of the calibration, -o; name another file.")
     check_report(out, numbers)
+    check_folders(out, logs)
     car, uses = car_of(vehicle), tuple(calibrate_on or ())
     drives = read_drives(logs, car, channels, fill, span, uses, anyway)
     if out is not None and any("steer" not in drive.recording for drive in drives):

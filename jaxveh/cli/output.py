@@ -58,6 +58,13 @@ def check_products(folder: Path, files: list[Path], force: bool, sources: tuple[
         check_product(file, io.SUFFIXES, force, sources)
 
 
+def check_folders(out: Path | None, logs: list[Path]) -> None:
+    """Raise `InputError`, before any work, if the figures of two logs would go into one folder of `--out`."""
+    stems = [log.stem for log in logs]
+    if out is not None and (twice := [stem for stem in stems if stems.count(stem) > 1]):
+        raise InputError(f"--out {out}: the figures of two logs would be in {out / twice[0]}; rename one of the logs.")
+
+
 def check_report(out: Path | None, numbers: Path | None) -> None:
     """Raise `InputError`, before any work, if `--out` or `--json` could not be written, or matplotlib is missing."""
     if out is not None:

@@ -209,3 +209,31 @@ def test_one_file_by_two_names_is_not_two_products(tmp_path):
     given = ("fit", write_log(tmp_path), "--vehicle", write_car(tmp_path), "-o", tmp_path / "out.toml")
     line = refused(tmp_path, run(*given, "--car-file", tmp_path / "sub" / ".." / "out.toml"))
     assert "--car-file" in line and "is the file of the calibration, -o" in line
+
+
+PROGRAMS_OF_SEVERAL_LOGS = {
+    "fit": ("out.toml",),
+    "estimate": ("out",),
+    "estimate --what": ("out", "--what", "all"),
+}
+
+
+@pytest.mark.parametrize("program", PROGRAMS_OF_SEVERAL_LOGS)
+def test_no_log_is_named_twice_and_none_is_drawn_over_another(program, tmp_path):
+    """A log fitted twice would make the fit look surer than it is; the quantities of --what are estimated log by log."""
+    name, (product, *more) = program.partition(" ")[0], PROGRAMS_OF_SEVERAL_LOGS[program]
+    one, car = write_log(tmp_path), write_car(tmp_path)
+    linked, folder = tmp_path / "linked.csv", tmp_path / "other"
+    linked.symlink_to(one)
+    folder.mkdir()
+    other = write_log(folder)
+    assert other.name == one.name
+    call = lambda second, *options: run(
+        name, one, second, "--vehicle", car, "-o", tmp_path / product, "--force", *more, *options
+    )
+    for second in (one, linked)[: 1 if more else 2]:
+        line = error_line(call(second))
+        assert "named twice" in line or "two logs would be written to" in line, line
+    line = error_line(call(other, "--out", tmp_path / "figures"))
+    assert "the figures of two logs" in line or "two logs would be written to" in line, line
+    assert not (tmp_path / "figures").exists()
