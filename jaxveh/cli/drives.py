@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -37,6 +38,23 @@ class Drive(NamedTuple):
     findings: Sequence[diagnostics.LogFinding] = ()
 
 
+@contextmanager
+def naming(log: Path, logs: Sequence[Path]) -> Iterator[None]:
+    """Begin the messages of errors about one of several `logs` with its name, unless they name it."""
+    try:
+        yield
+    except InputError as error:
+        if len(logs) == 1 or log.name in str(error):
+            raise
+        raise InputError(f"{log}: {error}") from error
+
+
+def with_channel(drive: Drive, name: str, source: str, logs: Sequence[Path]) -> Drive:
+    """Return one of several `logs` with its channel `source` in the place of the channel `name`."""
+    with naming(drive.log, logs):
+        return drive._replace(recording=drive.recording.replace(**{name: drive.recording[source]}))
+
+
 def read_drives(
     logs: list[Path],
     car: CarSpecification,
@@ -56,8 +74,9 @@ def read_drives(
         raise InputError(f"{twice[1]}: the log is named twice; name each log once.")
     drives = []
     for log in logs:
-        recording = with_speed(log, _on_one_clock(log, _read(log, car, channels, span)), car)
-        recording = fill_gaps(recording, fill)
+        with naming(log, logs):
+            recording = with_speed(log, _on_one_clock(log, _read(log, car, channels, span)), car)
+            recording = fill_gaps(recording, fill)
         findings = _look_at(log, recording, car, {*SEEN, "time", *(name for name in used if name)}, anyway)
         drives.append(Drive(log, recording, findings))
     if not anyway:

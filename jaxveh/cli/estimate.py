@@ -16,7 +16,7 @@ from jaxveh._core.recording import TRUTH as SIMULATED
 from jaxveh.cli import options, quantities, quantity_options, sideslip
 from jaxveh.cli.blanking import LogParts, split
 from jaxveh.cli.console import number, progress, results, spread, table
-from jaxveh.cli.drives import Drive, read_drives
+from jaxveh.cli.drives import Drive, naming, read_drives, with_channel
 from jaxveh.cli.estimate_figures import draw
 from jaxveh.cli.estimate_report import check_report_page, reported_log, write_report
 from jaxveh.cli.output import check_product, check_products, check_report, write_numbers
@@ -187,7 +187,7 @@ def _estimate(choice: Choice) -> tuple[Any, dict[str, Any]]:
     used = (choice.truth, *choice.calibrate_on)
     drives = read_drives(choice.logs, car, choice.channels, choice.fill, choice.span, used, choice.anyway)
     choice, drives = _with_simulated_truth(choice, drives)
-    jobs = [_job(choice, drive, product) for drive, product in zip(drives, products, strict=True)]
+    jobs = [_job(choice, car, drive, product) for drive, product in zip(drives, products, strict=True)]
     fitted_on = [job.parts.estimate if job.parts.calibration is None else job.parts.calibration for job in jobs]
     reason = "--as-told" if choice.as_told else None
     if found is None and reason is None and choice.calibrate is None:
@@ -242,18 +242,19 @@ def _with_simulated_truth(choice: Choice, drives: Sequence[Drive]) -> tuple[Choi
         raise InputError(
             f"--truth {choice.truth}: --calibrate-on uses {name}: take --truth {name}, or leave --calibrate-on out."
         )
-    logs = [drive.recording.replace(**{name: drive.recording[choice.truth]}) for drive in drives]
-    return choice._replace(truth=name), [one._replace(recording=log) for one, log in zip(drives, logs, strict=True)]
+    return choice._replace(truth=name), [with_channel(one, name, choice.truth, choice.logs) for one in drives]
 
 
-def _job(choice: Choice, drive: Drive, product: Path) -> Job:
+def _job(choice: Choice, car: io.CarSpecification, drive: Drive, product: Path) -> Job:
     time = drive.recording.time
     if product.suffix.lower() == MCAP_SUFFIX and time[0] < 0:
         raise InputError(
             f"-o {product}: time stamps must be at least zero, but the log begins at {time[0]:.15g} s: write another format."
         )
     span = options.span_of(choice.calibrate, float(time[0]), float(time[-1]))
-    parts = split(drive.recording, span, choice.calibrate_on, choice.truth)
+    with naming(drive.log, choice.logs):
+        parts = split(drive.recording, span, choice.calibrate_on, choice.truth)
+        sideslip.check_truth(car, parts.truth, choice.truth)
     out = choice.out if choice.out is None or len(choice.logs) == 1 else choice.out / drive.log.stem
     return Job(drive, parts, span, product, out)
 

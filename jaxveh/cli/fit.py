@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
-from jaxveh import InputError, estimators, io
+from jaxveh import InputError, Recording, estimators, io
 from jaxveh.cli import options, sideslip
 from jaxveh.cli.blanking import calibration_part
 from jaxveh.cli.console import progress, results
-from jaxveh.cli.drives import Drive, read_drives
+from jaxveh.cli.drives import Drive, naming, read_drives
 from jaxveh.cli.estimate import print_fitted
 from jaxveh.cli.output import check_folders, check_product, check_report, make_folder, write_numbers
 from jaxveh.cli.vehicle import car_of
@@ -66,7 +66,7 @@ def fit(
         raise InputError(
             "--out: the force curves need steer, which is missing from the log. Map its column, or leave --out out."
         )
-    parts = [calibration_part(drive.recording, uses) for drive in drives]
+    parts = [_part(drive, uses, logs) for drive in drives]
     with progress("fit") as report:
         calibration = sideslip.calibrate(car, parts, uses, report).with_log_names(*(log.name for log in logs))
     estimators.write_calibration(calibration, product, overwrite=force)
@@ -82,6 +82,11 @@ def fit(
     }  # fmt: skip
     shown = {"file": product, "car_file": car_file, "figures": figures}
     write_numbers(numbers, {**sideslip.fitted_parameters(calibration), **shown}, configuration, None)
+
+
+def _part(drive: Drive, uses: tuple[str, ...], logs: list[Path]) -> Recording:
+    with naming(drive.log, logs):
+        return calibration_part(drive.recording, uses)
 
 
 def _write_car(

@@ -88,6 +88,18 @@ def _reference(seen: Recording, name: str) -> Recording:
     return seen if name == "v_y" else seen.replace(v_y=np.asarray(seen["v_x"]) * np.tan(np.asarray(seen[name])))
 
 
+def check_truth(car: CarSpecification, seen: Recording, name: str | None) -> None:
+    """Raise `InputError`, before any work, if the truth channel, one of `SCORED`, has no row that can be scored."""
+    if name is None:
+        return
+    floor = least_speed_of(car)
+    if not (np.isfinite(np.asarray(seen[name])) & (np.asarray(seen["v_x"]) >= floor)).any():
+        raise InputError(
+            f"--truth {name}: no row has both a value of it and a speed v_x of at least {floor:g} m/s, so nothing can be scored: "
+            "leave --truth out, or this log."
+        )
+
+
 def truth_of(car: CarSpecification, seen: Recording, name: str) -> dict[str, np.ndarray]:
     """Return the true values of the displayed quantities from the truth channel, by name (T,), at the centre of gravity."""
     v_x, v_y = np.asarray(seen["v_x"]), np.asarray(sideslip.at_centre(car, _reference(seen, name))["v_y"])

@@ -18,6 +18,10 @@ NEVER_STILL = ("v_x", "v_y", "a_x", "a_y", "yaw_rate", "roll_rate", "sideslip")
 JUMPY = ("throttle", "brake", "wheel_speed", "drive_torque", "gear")
 """Beginnings of the names of channels that may jump although nothing is wrong."""
 
+TURNING = 0.5
+"""Standard deviation of the lateral acceleration of a moving car, m/s^2, with which neither its yaw rate nor its a_y can be
+constant: a straight drive on a level road has the noise of its sensors, 0.1 or so."""
+
 SPIKE = 8.0
 """A sample is a spike if it is this many robust deviations, and `SPIKE_RANGE` of the range, off the running median."""
 
@@ -34,6 +38,9 @@ def check_samples(log: LogView) -> list[LogFinding]:
             continue
         time, samples = log.time[present], values[present]
         if np.all(samples == samples[0]):
+            if (turning := _contradicted(log, name)) is not None:
+                findings.append(turning)
+                continue
             why = ": the sensor does not work, or the manoeuvre does not excite it" if name in NEVER_STILL else ""
             findings.append(
                 LogFinding("note", name, f"is constant at {samples[0]:g}{why}.", {"value": float(samples[0])})
@@ -44,6 +51,21 @@ def check_samples(log: LogView) -> list[LogFinding]:
         findings += still if name in NEVER_STILL else _told(still)
         findings += _told(_spikes(name, time, samples)) if name.startswith(JUMPY) else _spikes(name, time, samples)
     return findings
+
+
+def _contradicted(log: LogView, name: str) -> LogFinding | None:
+    """Return the finding about a constant yaw rate while a_y varies, or a constant a_y while the yaw rate does; else None."""
+    other = {"yaw_rate": "a_y", "a_y": "yaw_rate"}.get(name)
+    if other is None or not log.has("v_x", other):
+        return None
+    v_x = log.even("v_x")
+    lateral = log.even(other) * (v_x if other == "yaw_rate" else 1.0)
+    lateral = lateral[(np.abs(v_x) > log.least_speed) & np.isfinite(lateral)]
+    if lateral.size < 10 or np.std(lateral) < TURNING:
+        return None
+    constant = float(log.channels[name][np.isfinite(log.channels[name])][0])
+    message = f"is constant at {constant:g} while {other} shows turns: the sensor does not work; leave the channel out."
+    return LogFinding("error", name, message, {"value": constant})
 
 
 def _told(findings: list[LogFinding]) -> list[LogFinding]:

@@ -237,3 +237,46 @@ def test_no_log_is_named_twice_and_none_is_drawn_over_another(program, tmp_path)
     line = error_line(call(other, "--out", tmp_path / "figures"))
     assert "the figures of two logs" in line or "two logs would be written to" in line, line
     assert not (tmp_path / "figures").exists()
+
+
+def without(name):
+    return {column: values for column, values in columns().items() if column != name}
+
+
+BAD_AMONG_GOOD = {
+    "no yaw rate": without("yaw_rate"),
+    "no speed": without("v_x"),
+    "no reference": without("v_y"),
+    "a gap": columns() | {"v_x": np.where(np.arange(200) == 50, np.nan, 20.0)},
+    "an empty channel": columns() | {"v_x": np.full(200, np.nan)},
+    "a dead sensor": columns() | {"yaw_rate": np.zeros(200)},
+    "parked": columns() | {name: np.zeros(200) for name in ("v_x", "yaw_rate", "a_y")},
+    "two rows": columns(2),
+    "time that steps back": columns() | {"time": np.roll(columns()["time"], 9)},
+}
+
+
+@pytest.mark.parametrize("fault", BAD_AMONG_GOOD)
+@pytest.mark.parametrize(
+    "program",
+    [
+        ("fit", "-o", "out.toml", "--calibrate-on", "v_y"),
+        ("estimate", "-o", "out", "--truth", "v_y"),
+        ("estimate", "-o", "out", "--truth", "v_y", "--what", "sideslip", "--methods", "rear_axle"),
+    ],
+    ids=["fit", "sideslip", "quantity"],
+)
+def test_a_bad_log_among_good_ones_is_named_before_any_work(fault, program, tmp_path, monkeypatch):
+    """A fit does not look at the speed of a reference; of the other quantities many need no yaw rate and no motion."""
+    if fault == "parked" and program[0] == "fit" or fault in ("parked", "a dead sensor") and "--what" in program:
+        pytest.skip("the program does not refuse it")
+    bad = write_log(tmp_path, BAD_AMONG_GOOD[fault]).rename(tmp_path / "bad.csv")
+    good, car = write_log(tmp_path), write_car(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    # Quantities are estimated log by log: the bad one is refused first.
+    logs = (bad, good) if "--what" in program else (good, bad)
+    result = run(program[0], *logs, "--vehicle", car, *program[1:])
+    line = result.stderr.strip().splitlines()[-1]
+    assert result.exit_code == 2 and line.startswith("error: "), result.output
+    assert "bad.csv" in line and "drive.csv" not in line.replace(str(tmp_path), "")
+    assert not [path for path in tmp_path.rglob("*.parquet")] and not (tmp_path / "out.toml").exists()

@@ -124,6 +124,13 @@ FAULTS = {
         r"stays constant 1 time\(s\) .*the longest 1.99 s at 1 s",
     ),
     "constant": ({"a_x": at(slice(None), 0.0)}, "note", "a_x", "is constant at 0"),
+    "dead yaw rate": (
+        {"yaw_rate": at(slice(None), 0.02)},
+        "error",
+        "yaw_rate",
+        "is constant at 0.02 while a_y shows turns",
+    ),
+    "dead a_y": ({"a_y": at(slice(None), -0.1)}, "error", "a_y", "is constant at -0.1 while yaw_rate shows turns"),
     "coarse": ({"steer": lambda v: np.round(v / 0.002) * 0.002}, "note", "steer", "is quantised in steps of 0.002"),
     "spike": ({"yaw_rate": at(2000, 0.9)}, "warning", "yaw_rate", r"1 spike\(s\), the largest 0.9 at 20 s"),
     "spike to zero": ({"v_x": at([700, 701], 0.0)}, "warning", "v_x", r"2 spike\(s\), the largest 0 at 7 s"),
@@ -190,6 +197,23 @@ def test_magnitudes_alone():
     ):
         assert matching(findings(time, {name: size * wave}), "error", name, f"looks like {likely}")
         assert matching(findings(time, {name: 0.1 * wave}), "ok", name, r"reaches 0\.(1|09)")
+
+
+def test_a_constant_channel_of_a_straight_drive_is_no_error(sound):
+    """Nor one of a car that stands while it is loaded; a sensor of another rate is compared at the times of both."""
+    time, channels = sound
+    noise = np.random.default_rng(5).normal(size=time.size)
+    for name, other, size in (("yaw_rate", "a_y", 0.15), ("a_y", "yaw_rate", 0.005)):
+        straight = {**channels, name: 0 * time, other: size * noise}
+        standing = {**channels, name: 0 * time, "v_x": 0 * time}
+        for quiet in (straight, standing):
+            assert not matching(findings(time, quiet), "error", name, "shows turns")
+        slow = {
+            **channels,
+            name: np.where(np.arange(time.size) % 2, 0.0, np.nan),
+            "v_x": np.where(np.arange(time.size) % 7, np.nan, channels["v_x"]),
+        }
+        assert matching(findings(time, slow), "error", name, f"is constant at 0 while {other} shows turns")
 
 
 def test_smooth_held_and_digital_channels_are_no_faults(sound):
