@@ -39,7 +39,7 @@ class Drive(NamedTuple):
 
 
 @contextmanager
-def naming(log: Path, logs: Sequence[Path]) -> Iterator[None]:
+def names_log(log: Path, logs: Sequence[Path]) -> Iterator[None]:
     """Begin the messages of errors about one of several `logs` with its name, unless they name it."""
     try:
         yield
@@ -51,7 +51,7 @@ def naming(log: Path, logs: Sequence[Path]) -> Iterator[None]:
 
 def with_channel(drive: Drive, name: str, source: str, logs: Sequence[Path]) -> Drive:
     """Return one of several `logs` with its channel `source` in the place of the channel `name`."""
-    with naming(drive.log, logs):
+    with names_log(drive.log, logs):
         return drive._replace(recording=drive.recording.replace(**{name: drive.recording[source]}))
 
 
@@ -74,7 +74,7 @@ def read_drives(
         raise InputError(f"{twice[1]}: the log is named twice; name each log once.")
     drives = []
     for log in logs:
-        with naming(log, logs):
+        with names_log(log, logs):
             recording = with_speed(log, _on_one_clock(log, _read(log, car, channels, span)), car)
             recording = fill_gaps(recording, fill)
         findings = _look_at(log, recording, car, {*SEEN, "time", *(name for name in used if name)}, anyway)

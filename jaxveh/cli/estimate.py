@@ -16,7 +16,7 @@ from jaxveh._core.recording import TRUTH as SIMULATED
 from jaxveh.cli import options, quantities, quantity_options, sideslip
 from jaxveh.cli.blanking import LogParts, split
 from jaxveh.cli.console import number, progress, results, spread, table
-from jaxveh.cli.drives import Drive, naming, read_drives, with_channel
+from jaxveh.cli.drives import Drive, names_log, read_drives, with_channel
 from jaxveh.cli.estimate_figures import draw
 from jaxveh.cli.estimate_report import check_report_page, reported_log, write_report
 from jaxveh.cli.output import check_product, check_products, check_report, write_numbers
@@ -252,7 +252,7 @@ def _job(choice: Choice, car: io.CarSpecification, drive: Drive, product: Path) 
             f"-o {product}: time stamps must be at least zero, but the log begins at {time[0]:.15g} s: write another format."
         )
     span = options.span_of(choice.calibrate, float(time[0]), float(time[-1]))
-    with naming(drive.log, choice.logs):
+    with names_log(drive.log, choice.logs):
         parts = split(drive.recording, span, choice.calibrate_on, choice.truth)
         sideslip.check_truth(car, parts.truth, choice.truth)
     out = choice.out if choice.out is None or len(choice.logs) == 1 else choice.out / drive.log.stem

@@ -11,7 +11,7 @@ from jaxveh import InputError, Recording, estimators, io
 from jaxveh.cli import options, sideslip
 from jaxveh.cli.blanking import calibration_part
 from jaxveh.cli.console import progress, results
-from jaxveh.cli.drives import Drive, naming, read_drives
+from jaxveh.cli.drives import Drive, names_log, read_drives
 from jaxveh.cli.estimate import print_fitted
 from jaxveh.cli.output import check_folders, check_product, check_report, make_folder, write_numbers
 from jaxveh.cli.vehicle import car_of
@@ -85,7 +85,7 @@ def fit(
 
 
 def _part(drive: Drive, uses: tuple[str, ...], logs: list[Path]) -> Recording:
-    with naming(drive.log, logs):
+    with names_log(drive.log, logs):
         return calibration_part(drive.recording, uses)
 
 

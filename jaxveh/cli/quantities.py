@@ -14,7 +14,7 @@ from jaxveh._core.errors import check_one_of, check_positive
 from jaxveh._core.recording import TRUTH
 from jaxveh.cli.blanking import fill_short, with_fill_option
 from jaxveh.cli.console import number, progress, results, spread, table
-from jaxveh.cli.drives import naming, read_log
+from jaxveh.cli.drives import names_log, read_log
 from jaxveh.cli.missing_speed import has_wheels, wants_v_x, with_speed
 from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
 from jaxveh.cli.quantity_options import QUANTITIES, USUAL_FILTER, USUAL_PARTICLES, inputs_of
@@ -119,7 +119,7 @@ def estimate_quantities(asked: Asked, numbers: Path | None) -> None:
         shown = []
         for k, (log, (seen, recording)) in enumerate(zip(asked.logs, told, strict=True)):
             report(k, len(told), f"estimating along {log.name} (compiling first)")
-            with naming(log, asked.logs):
+            with names_log(log, asked.logs):
                 own = _logs(asked, log, seen, car)
                 shown.append({name: _one(asked, QUANTITIES[name], car, own[name], recording) for name in asked.what})
     for log, product, (_, recording), one in zip(asked.logs, products, told, shown, strict=True):

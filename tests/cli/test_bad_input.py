@@ -268,7 +268,7 @@ BAD_AMONG_GOOD = {
 )
 def test_a_bad_log_among_good_ones_is_named_before_any_work(fault, program, tmp_path, monkeypatch):
     """A fit does not look at the speed of a reference; of the other quantities many need no yaw rate and no motion."""
-    if fault == "parked" and program[0] == "fit" or fault in ("parked", "a dead sensor") and "--what" in program:
+    if (fault == "parked" and program[0] == "fit") or (fault in ("parked", "a dead sensor") and "--what" in program):
         pytest.skip("the program does not refuse it")
     bad = write_log(tmp_path, BAD_AMONG_GOOD[fault]).rename(tmp_path / "bad.csv")
     good, car = write_log(tmp_path), write_car(tmp_path)
@@ -279,4 +279,4 @@ def test_a_bad_log_among_good_ones_is_named_before_any_work(fault, program, tmp_
     line = result.stderr.strip().splitlines()[-1]
     assert result.exit_code == 2 and line.startswith("error: "), result.output
     assert "bad.csv" in line and "drive.csv" not in line.replace(str(tmp_path), "")
-    assert not [path for path in tmp_path.rglob("*.parquet")] and not (tmp_path / "out.toml").exists()
+    assert not list(tmp_path.rglob("*.parquet")) and not (tmp_path / "out.toml").exists()
