@@ -48,9 +48,9 @@ def record(name: str, values: Mapping):
 
 
 def as_mapping(values, what: str = "values") -> dict:
-    """Return a NamedTuple or a mapping as an ordered dict of its fields."""
-    if isinstance(values, Mapping):
-        return dict(values)
+    """Return a NamedTuple, a mapping, or a data frame or a row of one, as an ordered dict of its fields."""
+    if isinstance(values, Mapping) or (hasattr(values, "items") and not isinstance(values, type)):
+        return dict(values.items())
     if hasattr(values, "_asdict"):
         return dict(values._asdict())
     raise InputError(f"{what} = {type(values).__name__}: must be a NamedTuple or a mapping from names to values.")

@@ -64,6 +64,15 @@ def test_a_number_of_a_row_that_is_none_is_named(live):
     assert eqx.tree_equal(first, missing) or str(first) == str(missing)
 
 
+def test_frames_and_their_rows_are_mappings():
+    frame = DRIVE.to_pandas().drop(columns="time", errors="ignore")
+    again = Recording(T, frame)
+    assert again.names == DRIVE.names
+    for live in (LIVE, METHOD):
+        of_row, of_dict = (live.init(0.0, row)[1].mean for row in (frame.iloc[0], ROW))
+        assert eqx.tree_equal(of_row, of_dict)
+
+
 def test_gaps_are_filled_up_to_a_length():
     gappy = DRIVE.replace(a_y=np.where(T == 0.2, np.nan, T))
     for wrong in (-1.0, 0.0, np.nan):
