@@ -146,8 +146,13 @@ def _read(path: Path) -> Any:
     io.check_readable(path)
     try:
         frame = pd.read_csv(path)
-    except (pd.errors.ParserError, UnicodeDecodeError) as error:
+        names = (
+            pd.read_csv(path, header=None, nrows=1, dtype=str).iloc[0].tolist()
+        )  # pandas renames the second of a name
+    except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: is not a CSV table ({error}).") from None
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1 and _is_wanted(name)]:
+        raise InputError(f"{path}: several columns are named {', '.join(map(repr, twice))}; rename them.")
     for name in filter(_is_wanted, frame):
         if not pd.api.types.is_numeric_dtype(frame[name]):
             bad = pd.to_numeric(frame[name], errors="coerce").isna().to_numpy().argmax()

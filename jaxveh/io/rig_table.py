@@ -212,9 +212,10 @@ def _ttc_axes(path: Path, load: np.ndarray) -> str:
 
 def _read_csv(path: Path, measured: tuple[str, ...]) -> dict[str, np.ndarray | None]:
     table = read_columns(path)
-    plain = {heading: split_unit(heading) for heading in table.headings}
-    plain |= {heading: (heading, unit) for heading, unit in table.units.items() if unit}
-    names = [name for name, _ in plain.values()]
+    told = lambda heading: (heading, table.units[heading]) if table.units.get(heading) else split_unit(heading)
+    plain = {heading: told(heading) for heading in table.headings}
+    # Of columns with the same heading, `cells` has the last one.
+    names = [plain[heading][0] for heading in table.headings if heading]
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
         raise InputError(f"{path}: several columns are named {', '.join(map(repr, twice))}; rename them.")
     units = dict(plain.values())

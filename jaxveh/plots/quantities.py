@@ -18,6 +18,7 @@ _SHOWN = {
     "N": ("kN", 1e-3),
     "N*m": ("N m", 1.0),
     "kg m^2": ("kg m²", 1.0),
+    "N/rad": ("kN/rad", 1e-3),
 }
 
 _WORDS = {
@@ -38,6 +39,11 @@ _UNITS = {
     "load_rear": "N",
     "yaw_acceleration": "rad/s^2",
     "steer_offset": "rad",
+    "mass": "kg",
+    "yaw_inertia": "kg m^2",
+    "front_axle_to_cg": "m",
+    "front_cornering_stiffness": "N/rad",
+    "rear_cornering_stiffness": "N/rad",
 }
 
 

@@ -82,6 +82,8 @@ def test_show_says_what_is_worth_a_look(tmp_path):
         ("Fz,alpha\n4000,fast\n", "alpha = 'fast' in row 0: must be a number"),
         ("Fz,alpha\n4000,0.1\n4000,nan\n", "alpha = nan in row 1: must be finite"),
         ("Fz,Vx\n4000,-3\n", "speed = -3 in row 0: must be at least 0"),
+        ("Fz,alpha,alpha\n4000,0.1,0.2\n", "several columns are named 'alpha'; rename them"),
+        (" \n", "is not a CSV table"),
         ("Fz,useMode\n4000,113\n", "useMode = 113: its digits must be 1 or 2"),
     ],
 )

@@ -109,6 +109,21 @@ def test_bad_tables_are_named(csv, table, message):
         io.read_rig_table(csv)
 
 
+def test_no_column_is_taken_of_two_with_one_name(csv):
+    """Also if one of them has another unit, or if the units are in a line of their own."""
+    others = {"rad": "deg", "m/s": "km/h", "Pa": "kPa", "N": "kN", "N*m": "N*m"}
+    unit = {name: others.get(unit) for names, unit in COLUMNS.values() for name in names[-1:]}
+    for name, other in unit.items():
+        more = [known for known in ("Fz", "alpha", "Fy") if known != name]
+        for second in (name, f"{name} [{other}]" if other else name):
+            csv.write_text(f"{name},{','.join(more)},{second}\n1,{','.join('1' for _ in more)},0\n")
+            with pytest.raises(InputError, match=f"several columns are named '{name}'"):
+                io.read_rig_table(csv)
+    csv.write_text("Fz,alpha,Fy,Fy\nN,deg,N,kN\n4000,1,2,3\n4000,-1,-2,-3\n")
+    with pytest.raises(InputError, match="several columns are named 'Fy'"):
+        io.read_rig_table(csv)
+
+
 def test_a_unit_in_the_name_is_believed(csv):
     csv.write_text("Fz,alpha [deg],gamma [rad],Fy\n4000,12,1.25,1\n")
     table = io.read_rig_table(csv)

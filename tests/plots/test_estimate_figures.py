@@ -7,9 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import InputError, Recording, io, plots
+from jaxveh import InputError, Recording, estimators, io, plots
 from jaxveh.estimators import sideslip
 from jaxveh.plots.innovations import slow_squares
+from jaxveh.plots.quantities import quantity
 
 TIME = np.arange(0.0, 150.0, 0.05)
 WAVE = np.sin(0.3 * TIME)
@@ -37,6 +38,17 @@ def edges(band):
     """Lower and upper edge of a band that is as wide everywhere, about zero."""
     corners = band.get_paths()[0].vertices[:, 1]
     return corners.min(), corners.max()
+
+
+def test_every_quantity_of_an_estimator_has_its_unit_at_the_axis():
+    modules = [one for name in estimators.__all__ if hasattr(one := getattr(estimators, name), "SHOWN")]
+    assert len(modules) > 8
+    for module in modules:
+        for name, unit in module.SHOWN.items():
+            shown = quantity(name)
+            assert shown == quantity(name, unit), name
+            assert bool(shown.unit) == (unit != "-"), name
+            assert not shown.unit or shown.label.endswith(f" [{shown.unit}]"), name
 
 
 def test_bands_of_50_and_95_percent_hold_as_many_draws_of_a_normal_law():
