@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxveh._core.bijectors import AbstractBijector, Positive, Real
+from jaxveh._core.bijectors import AbstractBijector, Interval, Positive, Real
 from jaxveh._core.errors import InputError, check, check_finite, check_positive, did_you_mean, float_array
 from jaxveh._core.names import check_names
 from jaxveh._core.parts import check_parts, check_static
@@ -64,7 +64,8 @@ def positive(unit: str = "-", **kwargs):
 
 
 def check_parameters(module: eqx.Module) -> None:
-    """Raise `InputError` unless every declared parameter of a module is finite, and positive if declared positive.
+    """Raise `InputError` unless every declared parameter of a module is finite, and within its domain if that is `Positive` or an
+    `Interval`.
 
     A field that holds a module or a NamedTuple must have one of the kinds that its annotation names. For use in
     `__check_init__`; an option that is off (None, if that is its default) passes, and so do tracers.
@@ -80,6 +81,11 @@ def check_parameters(module: eqx.Module) -> None:
             check_positive(name, value, field.metadata["unit"])
         else:
             check_finite(name, value)
+        if isinstance(domain, Interval):
+            low, high = domain.low, domain.high
+            check(
+                name, value, lambda v, low=low, high=high: (v > low) & (v < high), f"above {low:g} and below {high:g}"
+            )
 
 
 def strong(tree):

@@ -24,9 +24,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxveh._core.contracts import Checked, contract
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.estimated import Estimated
 from jaxveh._core.names import as_mapping, record
+from jaxveh._core.own_results import instance_of, several
 from jaxveh._core.parameter import check_parameters
 from jaxveh._core.parts import check_parts
 from jaxveh._core.result import Result, code
@@ -49,13 +51,25 @@ class Answer(NamedTuple):
     result: Any
 
 
-class AbstractMethod(eqx.Module):
+_MEMORY_AND_ANSWER = several(object, Answer, order="two, (memory, answer), the answer an Answer")
+
+
+def _needs(who: str, method: Any, given: tuple, result: Any) -> None:
+    """Raise `InputError` unless the needs of a method are a tuple of `Need`."""
+    del method, given
+    if not isinstance(result, tuple | list) or not all(isinstance(one, Need) for one in result):
+        raise InputError(f"{who} = {result!r}: must be a tuple of Need, such as (Need('a_x', 'm/s^2'),).")
+
+
+class AbstractMethod(Checked, eqx.Module):
     """A method. A row is a time (s) and a mapping of the channels of `needs` to scalars, NaN where not measured.
 
     Numbers that may be fitted are array leaves; those that a class declares as parameters are checked when it is made.
     Everything is a pure function of scalars: a batch is `jax.vmap`. **Raises** `InputError` for a parameter that is not finite,
     or not positive where it must be.
     """
+
+    _contract = contract(needs=_needs, first=_MEMORY_AND_ANSWER, next=_MEMORY_AND_ANSWER)
 
     def __check_init__(self):
         check_parameters(self)
@@ -80,6 +94,8 @@ class AbstractSmoothable(AbstractMethod):
 
     A row's belief is that of `ahead`, corrected by what the row measures; its answer is `say(memory)`.
     """
+
+    _contract = contract(say=instance_of(Answer, "an Answer"))
 
     @abc.abstractmethod
     def ahead(self, memory: Any, t: Any, values: dict[str, Any]) -> Any:

@@ -6,9 +6,12 @@ from typing import Any, ClassVar, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxveh import numerics
+from jaxveh._core.contracts import contract
 from jaxveh._core.errors import InputError, check, check_whole, kind_of_inner
+from jaxveh._core.own_results import in_words
 from jaxveh._core.result import Result, code
 from jaxveh.filters.choosing import AbstractResampling, Scheme, as_resampling, log_of
 from jaxveh.filters.particle_belief import ParticleBelief
@@ -234,6 +237,20 @@ class Expected(AbstractAhead):
         return belief, info
 
 
+def _proposal(who: str, filter_: Any, given: tuple, result: Any) -> None:
+    """Raise `InputError` unless there are particles with noise, with the fields and shapes of those given, and a log ratio."""
+    if type(result) is not tuple or len(result) != 2:
+        raise InputError(f"{who}: returned {in_words(result)}: must return two, (particles, log ratio or None).")
+    (moved, ratio), before = result, given[1]
+    if getattr(moved, "_fields", None) != before._fields:
+        raise InputError(f"{who}: its first result is {in_words(moved)}: must be the particles, {in_words(before)}.")
+    for name, value in [*zip(moved._fields, moved, strict=True), *([] if ratio is None else [("log ratio", ratio)])]:
+        if np.shape(value) != np.shape(before[0]):
+            raise InputError(
+                f"{who}: {name} has shape {np.shape(value)}: must have a number for each particle, {np.shape(before[0])}."
+            )
+
+
 class AbstractProposalFilter(AbstractParticleFilter):
     """A particle filter whose noise is drawn by `propose` and weighted accordingly. Everything else is as in the
     bootstrap filter: first particles from the prior, resampling before each step (Sarkka 2013, algorithm 7.4)."""
@@ -242,6 +259,7 @@ class AbstractProposalFilter(AbstractParticleFilter):
     resampling: Scheme = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
     gradient: str = eqx.field(static=True, default="score")
+    _contract = contract(propose=_proposal)
 
     def __check_init__(self):
         check_particle_settings(self.particles, self.threshold, self.gradient, self.resampling)

@@ -11,8 +11,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh._core.contracts import Checked, contract
 from jaxveh._core.errors import check, check_known, check_positive, is_concrete
-from jaxveh._core.parameter import parameter
+from jaxveh._core.own_results import named_numbers, number
+from jaxveh._core.parameter import check_parameters, parameter
 from jaxveh.numerics import smooth_step
 
 FASTEST = 150.0
@@ -41,7 +43,7 @@ class PedalInputs(NamedTuple):
     brake_torque: Any
 
 
-class AbstractManoeuvre(eqx.Module):
+class AbstractManoeuvre(Checked, eqx.Module):
     """The driver's inputs as a function of time from t = 0 to `duration` (s). Array leaves are its parameters.
 
     `adds_to_pedals`: its torques are added to the pedals of a `SpeedControl` that holds its speed.
@@ -49,6 +51,10 @@ class AbstractManoeuvre(eqx.Module):
 
     duration: eqx.AbstractVar[float]
     adds_to_pedals: ClassVar[bool] = False
+    _contract = contract(inputs=named_numbers)
+
+    def __check_init__(self):
+        check_parameters(self)
 
     @abc.abstractmethod
     def inputs(self, t: Any) -> Any:
@@ -62,6 +68,7 @@ class AbstractSteering(AbstractManoeuvre):
     duration: float = eqx.field(static=True)
     speed: jax.Array = parameter("m/s")
     steer: jax.Array = parameter("rad", scale=0.1)
+    _contract = contract(form=number)
 
     @abc.abstractmethod
     def form(self, t: jax.Array) -> jax.Array:

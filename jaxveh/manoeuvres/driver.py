@@ -7,14 +7,16 @@ from typing import Any
 
 import equinox as eqx
 
+from jaxveh._core.contracts import Checked, contract
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record_type
+from jaxveh._core.own_results import named_record, names
 from jaxveh._core.parameter import check_parameters
 from jaxveh.manoeuvres.base import AbstractManoeuvre
 from jaxveh.vehicles import Motion
 
 
-class AbstractDriver(eqx.Module):
+class AbstractDriver(Checked, eqx.Module):
     """A closed-loop driver: the car's inputs as a function of the time, the car's motion and the driver's own state.
 
     Array leaves are parameters. States (reaction lag, integrals) are scalars of a NamedTuple whose fields are
@@ -25,6 +27,7 @@ class AbstractDriver(eqx.Module):
     """
 
     duration: eqx.AbstractVar[float]
+    _contract = contract(state_names=names, start=named_record, inputs=named_record, derivatives=named_record)
 
     def __check_init__(self):
         check_parameters(self)

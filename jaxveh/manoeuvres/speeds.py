@@ -9,17 +9,21 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh._core.contracts import Checked, contract
 from jaxveh._core.errors import check, check_at_least, check_known, check_positive, check_single, check_whole
+from jaxveh._core.own_results import number
 from jaxveh._core.parameter import check_parameters, parameter
 from jaxveh.manoeuvres.base import as_time, check_speed
 from jaxveh.numerics import gauss_markov_harmonics, smooth_ramp, sum_of_harmonics
 
 
-class AbstractSpeed(eqx.Module):
+class AbstractSpeed(Checked, eqx.Module):
     """A demanded speed as a smooth function of time; array leaves are its parameters.
 
     **Raises** `InputError` for parameters outside their domain.
     """
+
+    _contract = contract(v_x=number)
 
     def __check_init__(self):
         check_parameters(self)

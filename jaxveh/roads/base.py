@@ -9,6 +9,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh._core.contracts import Checked, contract
+from jaxveh._core.own_results import of_kind
 from jaxveh._core.parameter import check_parameters
 
 
@@ -28,7 +30,7 @@ class Surface(NamedTuple):
     height: Any = 0.0
 
 
-class AbstractRoad(eqx.Module):
+class AbstractRoad(Checked, eqx.Module):
     """A road along the world's x axis. Its array leaves are its parameters.
 
     Slopes are quasi-static: they tilt gravity at the car's position. Vehicles and devices neglect the car's rotation with a
@@ -36,6 +38,8 @@ class AbstractRoad(eqx.Module):
 
     **Raises** `InputError` for parameters outside their domain.
     """
+
+    _contract = contract(at=of_kind(Surface))
 
     def __check_init__(self):
         check_parameters(self)

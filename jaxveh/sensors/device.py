@@ -4,7 +4,7 @@
 
 import abc
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import equinox as eqx
@@ -12,14 +12,44 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxveh._core.contracts import Checked, contract
 from jaxveh._core.errors import InputError, check_at_least, check_finite, check_key, check_positive, check_single
 from jaxveh._core.names import as_mapping
+from jaxveh._core.own_results import in_words, names
+from jaxveh._core.parameter import check_parameters
 from jaxveh.statespace import cast
 
 _ROUNDING = 1e-9
 
 
-class AbstractDevice(eqx.Module):
+def _samples(who: str, device: Any, given: tuple, said: Any) -> None:
+    """Raise `InputError` unless a device said an array (n,) for each of its channels, and nothing else."""
+    check_samples(who, device.channels, given[0].shape, said)
+
+
+def check_samples(who: str, channels: Iterable[str], shape: tuple[int, ...], said: Any) -> None:
+    """Raise `InputError` unless `said` has an array of this shape for each of the channels, and nothing else."""
+    if not isinstance(said, Mapping):
+        raise InputError(f"{who}: returned {in_words(said)}: must return a mapping from channels to arrays (n,).")
+    if set(said) != set(channels):
+        raise InputError(
+            f"{who}: returned {', '.join(said) or 'nothing'}: must return all these channels and no others: "
+            f"{', '.join(channels)}."
+        )
+    for name, value in said.items():
+        if getattr(value, "shape", None) != shape:
+            shown = f"an array {value.shape}" if hasattr(value, "shape") else in_words(value)
+            raise InputError(f"{who}: {name} is {shown}: must be an array {shape}, a number for each time.")
+
+
+def _units(who: str, device: Any, given: tuple, units: Any) -> None:
+    """Raise `InputError` unless a device has a unit for each channel."""
+    lacking = [name for name in device.channels if not isinstance(units, Mapping) or name not in units]
+    if lacking:
+        raise InputError(f"{who}: has no {', '.join(lacking)}: each channel must have a unit, '-' for a plain number.")
+
+
+class AbstractDevice(Checked, eqx.Module):
     """A measuring device on a car: it measures vehicle outputs and sends samples at `rate`.
 
     - `rate` (Hz), `phase` (s): it sends a sample at `phase + k / rate`, k = 0, 1, ...
@@ -39,6 +69,10 @@ class AbstractDevice(eqx.Module):
     rate: eqx.AbstractVar[float]
     delay: eqx.AbstractVar[float]
     phase: eqx.AbstractVar[float]
+    _contract = contract(channels=names, units=_units, needs=names, may_use=names, say=_samples)
+
+    def __check_init__(self):
+        check_parameters(self)
 
     @property
     @abc.abstractmethod

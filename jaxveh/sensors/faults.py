@@ -11,10 +11,11 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh._core.contracts import contract
 from jaxveh._core.errors import InputError, check, check_kind, is_concrete
 from jaxveh._core.names import as_names, check_names
 from jaxveh._core.parameter import check_parameters, parameter, positive
-from jaxveh.sensors.device import AbstractDevice, name_of
+from jaxveh.sensors.device import AbstractDevice, check_samples, name_of
 from jaxveh.sensors.randomness import subkey
 from jaxveh.sensors.spans import as_spans, check_spans, inside, since
 from jaxveh.sensors.wrapper import AbstractDeviceWrapper, check_device
@@ -31,10 +32,16 @@ def _names_or_none(channel) -> tuple[str, ...] | None:
     return None if channel is None else _names(channel)
 
 
+def _spoilt(who: str, fault: Any, given: tuple, said: Any) -> None:
+    """Raise `InputError` unless a fault returned the channels that it was given."""
+    check_samples(who, tuple(given[1]), given[0].shape, said)
+
+
 class AbstractFault(AbstractDeviceWrapper):
     """A fault in some of a device's channels (None: in all); times are the device's sample times, s."""
 
     channel: eqx.AbstractVar[tuple[str, ...] | None]
+    _contract = contract(spoil=_spoilt)
 
     def __check_init__(self):
         check_device(self)

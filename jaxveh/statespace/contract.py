@@ -8,8 +8,10 @@ from typing import Any, ClassVar, final
 
 import equinox as eqx
 
+from jaxveh._core.contracts import Checked, contract
 from jaxveh._core.errors import InputError, check_key, kind_of_inner, word_for
-from jaxveh._core.parts import check_static
+from jaxveh._core.own_results import not_none, several
+from jaxveh._core.parameter import check_parameters
 from jaxveh.numerics import apart
 from jaxveh.statespace.belief import AbstractBelief, Info
 from jaxveh.statespace.model import Row, StateSpace
@@ -37,7 +39,11 @@ class Gradient(enum.Enum):
     exact = 2
 
 
-class AbstractFilter(eqx.Module):
+_BELIEF_AND_INFO = several(AbstractBelief, Info, order="two, (belief, info)")
+"""The check of what a filter returns for a row."""
+
+
+class AbstractFilter(Checked, eqx.Module):
     """The contract of every filter.
 
     `init(model, row, key) -> (belief, info)` takes the prior as the belief at the first row's time and applies its
@@ -73,6 +79,7 @@ class AbstractFilter(eqx.Module):
     rows_between: ClassVar[bool] = False
     written_out: ClassVar[bool] = False
     shares_covariances: ClassVar[bool] = False
+    _contract = contract(_init=_BELIEF_AND_INFO, _step=_BELIEF_AND_INFO)
 
     def __init_subclass__(cls, **given):
         super().__init_subclass__(**given)
@@ -81,7 +88,7 @@ class AbstractFilter(eqx.Module):
                 raise TypeError(f"{cls.__name__}.{name}: is final. Write _{name}, which it runs.")
 
     def __check_init__(self):
-        check_static(self)
+        check_parameters(self)
 
     @property
     def gradients(self) -> Gradient:
@@ -125,6 +132,8 @@ class AbstractTwoPartFilter(AbstractFilter):
     The value that `_start` and `_predict` pass to `_update` is the filter's own (a belief, or particles without their weights),
     and opaque to wrappers.
     """
+
+    _contract = contract(_start=not_none, _predict=not_none, _update=_BELIEF_AND_INFO)
 
     @abc.abstractmethod
     def _start(self, model: StateSpace, row: Row, key: Any) -> Any:

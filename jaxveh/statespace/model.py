@@ -11,7 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_numbers, check_single, float_array, is_concrete
-from jaxveh._core.names import check_names, record
+from jaxveh._core.names import as_names, check_names, record
+from jaxveh._core.own_results import named_record, numbers_as_given
 from jaxveh._core.parameter import UNNAMED
 from jaxveh._core.recording import Recording, check_recording, gap_to_fill, time_for
 from jaxveh._core.traced import trace_once
@@ -125,7 +126,8 @@ class StateSpace(eqx.Module):
         law = measurement_noise
         self.measurement_noise = law if isinstance(law, AbstractNoise | StateDependent) else Gaussian(law)
         self.prior = prior
-        self.inputs, self.angles, self.input_path = tuple(inputs), tuple(angles), input_path
+        self.inputs, self.angles = as_names(inputs, "inputs"), as_names(angles, "angles")
+        self.input_path = input_path
         self.chosen = chosen
 
     def __check_init__(self):
@@ -194,6 +196,7 @@ class StateSpace(eqx.Module):
         moved = trace_once(self.transition_function, self.system, t0, t1, x, u)
         if getattr(moved, "_fields", None) != x._fields:
             raise InputError(f"transition returned {_describe(moved)}: must be the state, with {', '.join(x._fields)}.")
+        numbers_as_given("transition", (self.system, t0, t1, x, u), moved)
         return moved
 
     def observation(self, t, x, u):
@@ -205,6 +208,7 @@ class StateSpace(eqx.Module):
                 f"observation returned {_describe(seen)}, without {', '.join(lacks)}: must have every channel of the "
                 f"measurement noise ({', '.join(self.channels)})."
             )
+        numbers_as_given("observation", (self.system, t, x, u), seen)
         return seen
 
     def measurement_law(self, t, x, u) -> AbstractNoise:
@@ -214,7 +218,11 @@ class StateSpace(eqx.Module):
 
     def report(self, t, x, u):
         """The outputs of an Estimate for a state (or for a batch of states), in physical units."""
-        return x if self.report_function is None else self.report_function(self.system, t, x, u)
+        if self.report_function is None:
+            return x
+        said = self.report_function(self.system, t, x, u)
+        named_record("report", self, (), said)
+        return said
 
     def step_inputs(self, t0, t1, u0, u1):
         """The `u` that `transition` receives between two rows."""

@@ -9,7 +9,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh._core.contracts import Checked, contract
 from jaxveh._core.errors import InputError
+from jaxveh._core.own_results import named_numbers, names, of_kind
 from jaxveh._core.parameter import check_parameters
 from jaxveh._core.parameter_table import WithParameters
 
@@ -65,7 +67,7 @@ class Forces(NamedTuple):
     M_z: Any = 0.0
 
 
-class AbstractTyre(WithParameters, eqx.Module):
+class AbstractTyre(Checked, WithParameters, eqx.Module):
     """A tyre, or the tyres of an axle together: an elementwise force law whose array leaves are its parameters.
 
     **Raises** `InputError` for parameters outside their domain.
@@ -73,6 +75,7 @@ class AbstractTyre(WithParameters, eqx.Module):
 
     drawn_by = "tyre"
     called = "tyre law"
+    _contract = contract(forces=of_kind(Forces))
 
     def __check_init__(self):
         check_parameters(self)
@@ -87,6 +90,8 @@ class AbstractDynamicTyre(AbstractTyre):
 
     `forces(contact, state)` needs the tyre's state, a NamedTuple of scalars with the fields `state_names`.
     """
+
+    _contract = contract(state_names=names, start=named_numbers, derivatives=named_numbers)
 
     # Not an `eqx.AbstractVar`: under postponed annotations that would be a field, which `Relaxed` would never set. A copy of a
     # tyre with a field that is not set has another tree structure.

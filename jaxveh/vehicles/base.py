@@ -10,11 +10,13 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh._core.contracts import Checked, contract
 from jaxveh._core.names import check_names
+from jaxveh._core.own_results import names, of_kind
+from jaxveh._core.parameter import check_parameters
 from jaxveh._core.parameter_table import WithParameters
-from jaxveh._core.parts import check_static
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.checked import with_checked_results
+from jaxveh.vehicles import checked
 
 GRAVITY = 9.80665
 """Standard acceleration of free fall, m/s^2."""
@@ -64,7 +66,7 @@ def with_shared_parameters(kind: type) -> str:
     return "\n\n".join([*paragraphs[:at], *shared, *paragraphs[at:]]) + "\n    "
 
 
-class AbstractVehicle(WithParameters, eqx.Module):
+class AbstractVehicle(Checked, WithParameters, eqx.Module):
     """The equations of motion of one vehicle: array leaves are parameters, states and inputs are NamedTuples of scalars.
 
     The equations hold at one instant and are elementwise: for a batch of vehicles, states or parameters the fields are arrays.
@@ -78,16 +80,22 @@ class AbstractVehicle(WithParameters, eqx.Module):
 
     drawn_by = "car"
     called = "vehicle"
+    _contract = contract(
+        inputs=names,
+        state_type=checked.state_type,
+        units=checked.units,
+        start=checked.state,
+        evaluate=checked.rates_and_outputs,
+        motion=of_kind(Motion, numbers=False),
+    )
 
     def __init_subclass__(cls, **options: Any):
         super().__init_subclass__(**options)
         if not cls.__name__.startswith("Abstract"):
             cls.__doc__ = with_shared_parameters(cls)
-        if "evaluate" in vars(cls):
-            cls.evaluate = with_checked_results(cls.evaluate)
 
     def __check_init__(self):
-        check_static(self)
+        check_parameters(self)
 
     @property
     @abc.abstractmethod

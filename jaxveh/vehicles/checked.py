@@ -1,42 +1,49 @@
-"""Check of the results of a vehicle's `evaluate`: its own mistakes are reported by name, before anything else trips over them."""
+"""Checks of what a vehicle's own methods return: its mistakes are reported by name, before anything else trips over them."""
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
+from collections.abc import Mapping
 from typing import Any
 
 from jaxveh._core.errors import InputError
+from jaxveh._core.own_results import in_words, numbers_as_given
 
 
-def with_checked_results(evaluate: Callable) -> Callable:
-    """`evaluate`, whose results are checked while it is traced."""
-
-    @functools.wraps(evaluate)
-    def checked(self, *given, **options):
-        results = evaluate(self, *given, **options)
-        check_results(self, results)
-        return results
-
-    return checked
-
-
-def check_results(vehicle: Any, results: Any) -> None:
-    """Raise `InputError` unless `results` are the rates, of the vehicle's own `state_type`, and a NamedTuple of outputs."""
-    who = f"{type(vehicle).__name__}.evaluate"
+def rates_and_outputs(who: str, vehicle: Any, given: tuple, results: Any) -> None:
+    """Raise `InputError` unless `results` are the rates, of the vehicle's own `state_type`, and a NamedTuple of outputs, all real
+    numbers of the shape of what is given."""
     if not (isinstance(results, tuple) and len(results) == 2):
-        kind = f"{len(results)} results" if type(results) is tuple else type(results).__name__
+        kind = f"{len(results)} results" if type(results) is tuple else in_words(results)
         raise InputError(f"{who}: returned {kind}: must return two, (rates, outputs).")
     rates, outputs = results
     fields = vehicle.state_type._fields
     if getattr(rates, "_fields", None) != fields:
         order = " The order is (rates, outputs)." if getattr(outputs, "_fields", None) == fields else ""
-        raise InputError(f"{who}: its first result is {_kind(rates)}: must be {_kind(vehicle.state_type)}.{order}")
+        raise InputError(
+            f"{who}: its first result is {in_words(rates)}: must be {in_words(vehicle.state_type)}.{order}"
+        )
     if not hasattr(outputs, "_fields"):
-        raise InputError(f"{who}: its second result is {_kind(outputs)}: must be a NamedTuple of outputs.")
+        raise InputError(f"{who}: its second result is {in_words(outputs)}: must be a NamedTuple of outputs.")
+    numbers_as_given(f"{who}: rates", (vehicle, given), rates)
+    numbers_as_given(f"{who}: outputs", (vehicle, given), outputs)
 
 
-def _kind(thing: Any) -> str:
-    kind = thing if isinstance(thing, type) else type(thing)
-    fields = getattr(thing, "_fields", None)
-    return kind.__name__ if fields is None else f"{kind.__name__}({', '.join(fields)})"
+def state(who: str, vehicle: Any, given: tuple, result: Any) -> None:
+    """Raise `InputError` unless a result is the vehicle's state."""
+    del given
+    if getattr(result, "_fields", None) != vehicle.state_type._fields:
+        raise InputError(f"{who}: returned {in_words(result)}: must return {in_words(vehicle.state_type)}.")
+
+
+def state_type(who: str, vehicle: Any, given: tuple, result: Any) -> None:
+    """Raise `InputError` unless a vehicle's `state_type` is the class of a NamedTuple."""
+    del vehicle, given
+    if not isinstance(result, type) or not hasattr(result, "_fields"):
+        raise InputError(f"{who} = {result!r}: must be a class of NamedTuple, not called.")
+
+
+def units(who: str, owner: Any, given: tuple, result: Any) -> None:
+    """Raise `InputError` unless units are a mapping."""
+    del owner, given
+    if not isinstance(result, Mapping):
+        raise InputError(f'{who} = {result!r}: must be a mapping from names to units, such as {{"yaw_rate": "rad/s"}}.')

@@ -161,7 +161,11 @@ class Sprung(vehicles.AbstractVehicle):
     def start(self, t, u, **values):
         raise NotImplementedError
 
-    evaluate = motion = start
+    def evaluate(self, t, x, u, ground=None):
+        raise NotImplementedError
+
+    def motion(self, x, u):
+        raise NotImplementedError
 
 
 def test_build_serves_classes_that_it_does_not_know():

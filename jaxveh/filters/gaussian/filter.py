@@ -10,8 +10,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh._core.contracts import contract
 from jaxveh._core.errors import InputError, JaxvehWarning, check, kind_of_inner, word_for
 from jaxveh._core.names import record
+from jaxveh._core.own_results import instance_of, not_none, of_kind, several
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
 from jaxveh.filters.gaussian.forms import AbstractForm, Spread
@@ -39,6 +41,13 @@ class AbstractGaussianFilter(AbstractTwoPartFilter):
 
     whitens: ClassVar[bool] = True
     has_covariance: ClassVar[bool] = True
+    _contract = contract(
+        prior=not_none,
+        predict_between=not_none,
+        observe=of_kind(Image, numbers=False),
+        update=several(AbstractBelief, Info, order="two, (belief, info)"),
+        adapted_model=instance_of(StateSpace, "a StateSpace"),
+    )
 
     @property
     def gradients(self):
@@ -98,6 +107,7 @@ class AbstractRuleFilter(AbstractGaussianFilter):
     rows_between: ClassVar[bool] = True
     written_out: ClassVar[bool] = True
     form: eqx.AbstractVar[AbstractForm]
+    _contract = contract(rule=instance_of(AbstractRule, "a rule, such as filters.kit.Slopes()"))
 
     def __check_init__(self):
         for entry in dataclasses.fields(self):

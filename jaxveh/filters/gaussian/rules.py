@@ -11,6 +11,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxveh._core.contracts import Checked, contract
+from jaxveh._core.own_results import of_kind
 from jaxveh.numerics import as_whole, fence, sigma_points
 
 
@@ -29,11 +31,13 @@ class Image(NamedTuple):
     signs: np.ndarray | None
 
 
-class AbstractRule(eqx.Module):
+class AbstractRule(Checked, eqx.Module):
     """A rule for `image(f, mean, factor)`, the image of the Gaussian with this mean (n,) and P = F F^T, F = `factor` (n, n).
 
     `f` maps coordinates as rows (n, ...) to values as rows (m, ...), elementwise along the axes after the first.
     """
+
+    _contract = contract(image=of_kind(Image, numbers=False))
 
     # Not an `eqx.AbstractVar`: with postponed annotations that would be a field of the dataclass.
     @property

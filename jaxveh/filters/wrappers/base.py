@@ -6,7 +6,9 @@ from typing import Any, ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
+from jaxveh._core.contracts import contract
 from jaxveh._core.errors import InputError
+from jaxveh._core.own_results import instance_of, not_none
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
 from jaxveh.filters.outer_belief import AbstractTransparentBelief
@@ -25,7 +27,13 @@ class Remembering(AbstractTransparentBelief):
 
 
 class AbstractRemembering(AbstractGaussianWrapper):
-    """A filter around another with a memory of the rows so far, by which it changes the noises of the inner filter's model."""
+    """A filter around another with a memory of the rows so far, by which it changes the noises of the inner filter's model.
+
+    A subclass writes `start`, `believed_model` and `update`, which learns: `update_inside`, then a `Remembering` of its belief
+    `inside` and the new memory.
+    """
+
+    _contract = contract(start=not_none, believed_model=instance_of(StateSpace, "a StateSpace"))
 
     @abc.abstractmethod
     def start(self, model: StateSpace) -> Any:
