@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_one_of
+from jaxveh._core.errors import InputError, check_kind, check_one_of
 from jaxveh.tyres.base import Contact
 from jaxveh.tyres.mf_tyre import MFTyre
 
@@ -45,6 +45,7 @@ def evaluate(tyre: MFTyre, columns: Mapping[str, np.ndarray], *, axes: str = "is
 
     **Raises** `InputError` for a table without a load, an unknown mode or negative speeds.
     """
+    check_kind("evaluate: tyre", tyre, MFTyre, "Of another law call its `forces` with a Contact of arrays.")
     check_one_of("axes", axes, AXES)
     given = {name: _column(columns, names) for name, names in EVALUATION_INPUTS.items()}
     if given["Fz"] is None:
@@ -101,6 +102,8 @@ def _column(columns: Mapping[str, np.ndarray], names: tuple[str, ...]) -> np.nda
     for name in names:
         if name in columns:
             values = np.asarray(columns[name], dtype=float)
+            if values.ndim != 1:
+                raise InputError(f"{name} has shape {values.shape}: must be (n,), a number for each row.")
             if not np.isfinite(values).all():
                 row = int(np.flatnonzero(~np.isfinite(values))[0])
                 raise InputError(f"{name} = {values[row]} in row {row}: must be finite.")

@@ -1,5 +1,6 @@
 """A part of one's own that declares a parameter has it checked by its base, whatever it is derived from."""
 
+import dataclasses
 import inspect
 import re
 
@@ -9,26 +10,58 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import InputError, estimators, manoeuvres, roads, statespace, tyres
+from jaxveh import InputError, estimators, filters, manoeuvres, observers, roads, sensors, statespace, tyres, vehicles
 from jaxveh._core import errors
 from jaxveh.kit import positive
 
-# A manoeuvre is a function of time made by functions, which check what they are given.
-UNCHECKED = {"AbstractManoeuvre"}
-BASES = {
+NUMBERS = ("duration", "rate", "delay", "phase")
+"""Fields of some bases, which a class of one's own gives a default."""
+
+
+def asked_of(base):
+    """The fields that a class of one's own has to declare, or to be given."""
+    fields = dataclasses.fields(base) if dataclasses.is_dataclass(base) else ()
+    asked = {one.name for one in fields if one.default is one.default_factory is dataclasses.MISSING}
+    return asked | set(base.__abstractvars__)
+
+
+LISTED = {
     name: getattr(room, name)
-    for room in (estimators, estimators.kit, manoeuvres, roads, tyres)
+    for room in (estimators, estimators.kit, manoeuvres, roads, tyres, vehicles, sensors, filters, observers)
     for name in room.__all__
-    if name.startswith("Abstract") and name not in UNCHECKED
+    if name.startswith("Abstract")
 }
+# Their numbers are those of the filter, or of the car, that they are a part of.
+PARTS = {
+    "AbstractBelief", "AbstractForm", "AbstractLookahead", "AbstractPathSmoother", "AbstractResampling", "AbstractDrive",
+    "AbstractLoadTransfer",
+}  # fmt: skip
+BASES = {name: base for name, base in LISTED.items() if name not in PARTS and asked_of(base) <= set(NUMBERS)}
+
+
+def test_the_bases_of_every_room_are_here():
+    wanted = {
+        "AbstractTyre",
+        "AbstractVehicle",
+        "AbstractManoeuvre",
+        "AbstractDevice",
+        "AbstractFilter",
+        "AbstractMethod",
+    }
+    assert wanted <= set(BASES)
 
 
 def own(base, size):
     """A subclass of `base` with a positive parameter, everything else left empty."""
-    body = {name: lambda self, *_: None for name in base.__abstractmethods__}
-    told = {"duration": eqx.field(static=True, default=1.0), "state_names": eqx.field(static=True, default=())}
-    body |= told | {"size": positive("m", default=1.0), "__module__": __name__}
-    body["__annotations__"] = {"duration": float, "state_names": tuple, "size": jax.Array}
+    nothing = lambda self, *_, **__: None
+    body = {
+        name: property(nothing) if isinstance(inspect.getattr_static(base, name), property) else nothing
+        for name in base.__abstractmethods__
+    }
+    numbers = asked_of(base)
+    body |= {name: eqx.field(static=True, default=1.0) for name in numbers}
+    body |= {"size": positive("m", default=1.0), "__module__": __name__}
+    body["__annotations__"] = {**dict.fromkeys(numbers, float), "size": jax.Array}
     return type(base)("Own", (base,), body)(size=size)
 
 
