@@ -46,10 +46,20 @@ def kinds_in(value, base):
 
 def left_out(room, base, values, exempt):
     """Members of a family that none of the `values` is or has inside, and that are not `exempt` (a reason each); and exempt ones
-    that are none, or are there all the same."""
+    that are none, or are there all the same; each with what to do."""
     there = set().union(*(kinds_in(value, base) for value in values))
-    wanted = members(room, base)
-    return sorted((wanted - there - set(exempt)) | (set(exempt) - wanted) | (set(exempt) & there))
+    return wanting(members(room, base), {name for name in there if name in members(room, base)}, exempt)
+
+
+def wanting(wanted, there, exempt):
+    """The names of a family that a table lacks, has too much, or exempts in vain, each with what to do."""
+    return [
+        *(f"{name}: has no line here: add one, or a reason why not (CONTRIBUTING, Five recipes)"
+          for name in sorted(wanted - there - set(exempt))),
+        *(f"{name}: has a line here, but is not listed: remove the line, or list it" for name in sorted(there - wanted)),
+        *(f"{name}: has a reason why not, but is not listed: remove the reason" for name in sorted(set(exempt) - wanted)),
+        *(f"{name}: has a line and a reason why not: remove one" for name in sorted(set(exempt) & there)),
+    ]  # fmt: skip
 
 
 WRONG = {

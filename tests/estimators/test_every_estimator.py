@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import test_mass_and_grade
 import test_sideslip
+from families import wanting
 
 from jaxveh import InputError, Parameters, Recording, estimators, filters, fitting, vehicles
 from jaxveh._core.parameter import pick, put, resolve
@@ -88,7 +89,7 @@ def test_the_car_of_a_file_is_the_one_that_its_model_has(name):
 
 def test_every_module_of_the_room_that_calibrates_has_a_case_here():
     modules = {name for name in estimators.__all__ if isinstance(getattr(estimators, name), ModuleType)}
-    assert {name for name in modules if hasattr(estimator(name), "calibrate")} == set(CASES)
+    assert not wanting({name for name in modules if hasattr(estimator(name), "calibrate")}, set(CASES), {})
     assert all(hasattr(estimator(name), "METHODS") for name in modules - set(CASES) - {"kit", "learned"})
 
 

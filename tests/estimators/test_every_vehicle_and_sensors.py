@@ -5,7 +5,6 @@ which an error would come up.
 """
 
 import dataclasses
-import inspect
 
 import diffrax
 import equinox as eqx
@@ -13,6 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from families import members, wanting
 
 from jaxveh import InputError, Recording, estimators, filters, sensors, tyres, vehicles
 from jaxveh._core.names import record
@@ -99,14 +99,8 @@ def test_a_state_space_runs_or_says_what_to_do(name, suite):
 
 
 def test_the_table_has_every_vehicle_of_the_package():
-    concrete = {
-        name
-        for name in vehicles.__all__
-        if inspect.isclass(getattr(vehicles, name))
-        and issubclass(getattr(vehicles, name), vehicles.AbstractVehicle)
-        and not inspect.isabstract(getattr(vehicles, name))
-    }
-    assert concrete <= {type(make()).__name__ for make in CARS.values()}
+    listed = members("vehicles", vehicles.AbstractVehicle)
+    assert not wanting(listed, listed & {type(make()).__name__ for make in CARS.values()}, {})
 
 
 def test_an_accelerometer_of_a_car_that_does_not_say_its_yaw_acceleration():
