@@ -76,6 +76,14 @@ def named_record(who: str, owner: Any, given: tuple, result: Any) -> None:
         raise InputError(f"{who}: returned {in_words(result)}: must return a NamedTuple.")
 
 
+def states(who: str, owner: Any, given: tuple, result: Any) -> None:
+    """Check that a result is a tuple with a value for each of the `state_names`."""
+    del given
+    if not isinstance(result, tuple) or len(result) != len(owner.state_names):
+        shown = f"{len(result)} values" if type(result) is tuple else in_words(result)
+        raise InputError(f"{who}: returned {shown}: must return a NamedTuple of ({', '.join(owner.state_names)}).")
+
+
 def not_none(who: str, owner: Any, given: tuple, result: Any) -> None:
     """Check that a method returned something."""
     del owner, given

@@ -10,7 +10,7 @@ import equinox as eqx
 from jaxveh._core.contracts import Checked, contract
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record_type
-from jaxveh._core.own_results import named_record, names
+from jaxveh._core.own_results import named_record, names, states
 from jaxveh._core.parameter import check_parameters
 from jaxveh.manoeuvres.base import AbstractManoeuvre
 from jaxveh.vehicles import Motion
@@ -27,7 +27,7 @@ class AbstractDriver(Checked, eqx.Module):
     """
 
     duration: eqx.AbstractVar[float]
-    _contract = contract(state_names=names, start=named_record, inputs=named_record, derivatives=named_record)
+    _contract = contract(state_names=names, start=states, inputs=named_record, derivatives=states)
 
     def __check_init__(self):
         check_parameters(self)

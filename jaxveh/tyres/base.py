@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.contracts import Checked, contract
 from jaxveh._core.errors import InputError
-from jaxveh._core.own_results import named_numbers, names, of_kind
+from jaxveh._core.own_results import names, of_kind, states
 from jaxveh._core.parameter import check_parameters
 from jaxveh._core.parameter_table import WithParameters
 
@@ -91,7 +91,7 @@ class AbstractDynamicTyre(AbstractTyre):
     `forces(contact, state)` needs the tyre's state, a NamedTuple of scalars with the fields `state_names`.
     """
 
-    _contract = contract(state_names=names, start=named_numbers, derivatives=named_numbers)
+    _contract = contract(state_names=names, start=states, derivatives=states)
 
     # Not an `eqx.AbstractVar`: under postponed annotations that would be a field, which `Relaxed` would never set. A copy of a
     # tyre with a field that is not set has another tree structure.

@@ -29,9 +29,11 @@ def rates_and_outputs(who: str, vehicle: Any, given: tuple, results: Any) -> Non
 
 
 def state(who: str, vehicle: Any, given: tuple, result: Any) -> None:
-    """Raise `InputError` unless a result is the vehicle's state."""
+    """Raise `InputError` unless a result is the vehicle's state, or a tuple of as many numbers."""
     del given
-    if getattr(result, "_fields", None) != vehicle.state_type._fields:
+    fields = vehicle.state_type._fields
+    unnamed = type(result) is tuple and len(result) == len(fields)
+    if not unnamed and getattr(result, "_fields", None) != fields:
         raise InputError(f"{who}: returned {in_words(result)}: must return {in_words(vehicle.state_type)}.")
 
 

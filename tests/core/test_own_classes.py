@@ -77,7 +77,7 @@ def asked_of(base, name):
     return getattr(base, name), tuple(inspect.signature(getattr(base, name)).parameters)[1:]
 
 
-Own = type("Own", (), {"channels": ("q",), "state_type": record_type("State", ("v_x",))})
+Own = type("Own", (), {"channels": ("q",), "state_names": ("slip",), "state_type": record_type("State", ("v_x",))})
 """Stands for an object of the class: what is abstract cannot be made."""
 
 EVERY = [(base, name) for base in BASES for name in contract_of(BASES[base]) if name in BASES[base].__abstractmethods__]
