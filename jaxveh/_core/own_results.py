@@ -106,6 +106,13 @@ def several(*kinds: Any, order: str) -> Check:
     return check
 
 
+def belief_and_info(who: str, owner: Any, given: tuple, result: Any) -> None:
+    """Check that a filter returned two, and that the second, the info, is a NamedTuple."""
+    several(object, object, order="two, (belief, info)")(who, owner, given, result)
+    if not hasattr(result[1], "_fields"):
+        raise InputError(f"{who}: returned ({', '.join(map(in_words, result))}): must return two, (belief, info).")
+
+
 def instance_of(kind: Any, such_as: str) -> Check:
     """The check that a result is an instance of a class."""
 

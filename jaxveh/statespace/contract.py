@@ -10,7 +10,7 @@ import equinox as eqx
 
 from jaxveh._core.contracts import Checked, contract
 from jaxveh._core.errors import InputError, check_key, kind_of_inner, word_for
-from jaxveh._core.own_results import not_none, several
+from jaxveh._core.own_results import belief_and_info, not_none
 from jaxveh._core.parameter import check_parameters
 from jaxveh.numerics import apart
 from jaxveh.statespace.belief import AbstractBelief, Info
@@ -37,10 +37,6 @@ class Gradient(enum.Enum):
     none = 0
     on_average = 1
     exact = 2
-
-
-_BELIEF_AND_INFO = several(AbstractBelief, Info, order="two, (belief, info)")
-"""The check of what a filter returns for a row."""
 
 
 class AbstractFilter(Checked, eqx.Module):
@@ -79,7 +75,7 @@ class AbstractFilter(Checked, eqx.Module):
     rows_between: ClassVar[bool] = False
     written_out: ClassVar[bool] = False
     shares_covariances: ClassVar[bool] = False
-    _contract = contract(_init=_BELIEF_AND_INFO, _step=_BELIEF_AND_INFO)
+    _contract = contract(_init=belief_and_info, _step=belief_and_info)
 
     def __init_subclass__(cls, **given):
         super().__init_subclass__(**given)
@@ -133,7 +129,7 @@ class AbstractTwoPartFilter(AbstractFilter):
     and opaque to wrappers.
     """
 
-    _contract = contract(_start=not_none, _predict=not_none, _update=_BELIEF_AND_INFO)
+    _contract = contract(_start=not_none, _predict=not_none, _update=belief_and_info)
 
     @abc.abstractmethod
     def _start(self, model: StateSpace, row: Row, key: Any) -> Any:

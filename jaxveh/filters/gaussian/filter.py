@@ -13,7 +13,7 @@ from jaxveh import numerics
 from jaxveh._core.contracts import contract
 from jaxveh._core.errors import InputError, JaxvehWarning, check, kind_of_inner, word_for
 from jaxveh._core.names import record
-from jaxveh._core.own_results import instance_of, not_none, of_kind, several
+from jaxveh._core.own_results import belief_and_info, instance_of, not_none, of_kind
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
 from jaxveh.filters.gaussian.forms import AbstractForm, Spread
@@ -45,7 +45,7 @@ class AbstractGaussianFilter(AbstractTwoPartFilter):
         prior=not_none,
         predict_between=not_none,
         observe=of_kind(Image, numbers=False),
-        update=several(AbstractBelief, Info, order="two, (belief, info)"),
+        update=belief_and_info,
         adapted_model=instance_of(StateSpace, "a StateSpace"),
     )
 
