@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -162,6 +163,17 @@ def _beginning(path: Path) -> Iterator[None]:
         yield
 
 
+def _check_writable(path: Path) -> None:
+    """Make the folder of the store; raise `InputError` if nothing can be written there: a lock would seem to be held for ever."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        why = error.strerror or type(error).__name__
+        raise InputError(f"{path}: nothing can be written in {path.parent} ({why}); take another folder.") from error
+
+
 @contextlib.contextmanager
 def only_one(path: Path, part: tuple[int, int] | None) -> Iterator[Callable[[int], bool]]:
     """Lock the store, or one of its parts, against other sweeps while the block runs; gives a test for one's own chunks.
@@ -171,7 +183,7 @@ def only_one(path: Path, part: tuple[int, int] | None) -> Iterator[Callable[[int
     filelock = kit.require("filelock", "storing a sweep", "sweep")
     if part is not None and not (len(part) == 2 and 0 <= part[0] < part[1]):
         raise InputError(f"part = {part!r}: must be (i, n) with 0 <= i < n.")
-    path.parent.mkdir(parents=True, exist_ok=True)
+    _check_writable(path)
     name = "lock" if part is None else f"part-{part[0]}-of-{part[1]}.lock"
     lock = filelock.FileLock(path.with_name(f".{path.name}.{name}"), timeout=PROBED)
     try:

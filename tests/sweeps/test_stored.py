@@ -330,6 +330,24 @@ def test_without_a_store_there_is_no_client():
         sweeps.sweep(stored_study.run, DESIGN, SEEDS, KEY, processes=2)
 
 
+@pytest.mark.parametrize("options", [{}, {"part": (0, 2)}, {"processes": 2}], ids=str)
+def test_a_place_where_nothing_can_be_written_is_named(options, tmp_path, monkeypatch):
+    """Before, the lock that could not be made looked like that of another sweep."""
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="nothing can be written in .*file"):
+        stored_study.sweep(tmp_path / "file" / "sweep.zarr", **options)
+
+    def refuse(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("tempfile.TemporaryFile", refuse)
+    with pytest.raises(
+        InputError, match=r"sweep.zarr: nothing can be written in .* \(Permission denied\); take another"
+    ):
+        stored_study.sweep(tmp_path / "sweep.zarr", **options)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["file"]
+
+
 def test_a_folder_of_somebody_elses_is_left_alone(tmp_path):
     (tmp_path / "mine").mkdir()
     with pytest.raises(InputError, match="a folder without zarr.json, and no sweep's store; take another name"):
