@@ -45,6 +45,7 @@ from jaxveh.simulation.driven import (
 from jaxveh.simulation.events import Event
 from jaxveh.simulation.meter import meter_for
 from jaxveh.simulation.solve import Solution, even_grid, grid_through, solve
+from jaxveh.simulation.steered import warn_of_steer
 from jaxveh.simulation.stiffness import SolverChoice
 from jaxveh.statespace import cast
 from jaxveh.vehicles import AbstractVehicle, Travelling
@@ -102,7 +103,8 @@ def simulate(
     wheels turn, and twice as fast. Outside jit a warning says where equal steps were too long for the motion. A diffrax solver
     takes equal steps, or its own with a `stepsize_controller`. `adjoint`: diffrax's way to differentiate; the default serves
     reverse mode, and also forward mode with equal steps and no event (otherwise `diffrax.ForwardMode()`). `progress` gets the
-    share done (single runs). All may be jitted, vmapped over keys, cars and manoeuvres, and differentiated.
+    share done (single runs). All may be jitted, vmapped over keys, cars and manoeuvres, and differentiated. Outside jit a
+    steer of more than 1.6 rad gets a warning.
 
     **Raises** `InputError` for arguments out of range, sensors or an event of a wrong type, a manoeuvre without an input that the
     car needs, rows that coincide in the car's dtype; `FilterError`, with time, state and a remedy, if the motion does not stay
@@ -119,8 +121,7 @@ def simulate(
     with meter_for(progress) as meter:
         run = lambda choice: solve(driven, values, grid(choice.max_step), choice, until, adjoint, meter)
         found = _run(driven, values, run, _choice(solver, stepsize_controller, max_step), times, max_step)
-    if throw:
-        _check_finished(found, times)
+    _look_at(found, times, throw)
     source = f"simulation: {vehicle_name(car)}, {driver_name(driven.driver)}"
     if isinstance(sensors, Suite):
         return _cut(*_devices(driven, found, times, sensors, duration, key, source), found, until)
@@ -259,6 +260,12 @@ def _warn_of_long_steps(driven: Driven, found: Solution, choice: SolverChoice, t
             JaxvehWarning,
             stacklevel=4,
         )
+
+
+def _look_at(found: Solution, times: np.ndarray, throw: bool) -> None:
+    if throw:
+        _check_finished(found, times)
+    warn_of_steer(found, times)
 
 
 def _check_finished(found: Solution, times: np.ndarray) -> None:
