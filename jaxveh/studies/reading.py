@@ -53,7 +53,7 @@ fidelity = "single-track"
 yaw_inertia = 2300.0            # kg m^2
 
 [process_noise]                 # of state-space, by state, in its unit per root second
-v_y = 0.05
+v_y = 0.3
 yaw_rate = 0.02
 
 [filter]
@@ -76,7 +76,7 @@ UKF = "unscented"
 [vary.samples]                  # points that fill a box, as a further axis
 method = "sobol"                # a power of two; or "latin-hypercube"
 count = 8
-ranges = {"car.mass" = [1400.0, 1700.0], "told.front.D" = [7000.0, 8500.0]}
+ranges = {"car.mass" = [1400.0, 1700.0], "car.rear.scaling.LKY" = [0.6, 1.0]}   # LKY: of its tyres' cornering stiffness
 """
 """The file's schema as a commented example that can be read, for programs to print."""
 

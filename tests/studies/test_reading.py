@@ -25,7 +25,7 @@ def test_the_schema_reads_as_it_is(tmp_path):
     assert study.design.shape == (2, 3, 2, 8)
     assert study.size == 2 * 3 * 2 * 8 * 20
     words = study.words()
-    for part in ("car.mass", "told.front.D", "told.yaw_inertia", "the sensors' noise as it is"):
+    for part in ("car.mass", "car.rear.scaling.LKY", "told.yaw_inertia", "the sensors' noise as it is"):
         assert part in words
 
 
