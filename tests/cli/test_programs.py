@@ -159,11 +159,11 @@ def test_gaps_of_an_input_are_filled_on_request_only(tmp_path, drive):
     result, product = estimate(tmp_path, table)
     line = error_line(result)
     assert "v_x is NaN in 4 rows, first at t = 1 s" in line
-    assert "--fill SECONDS" in line
+    assert "add --fill 0.051 to fill them" in line
     assert not product.exists()
     result, _ = estimate(tmp_path, table, "--fill", "0.02")
-    assert "raise --fill" in error_line(result)
-    result, product = estimate(tmp_path, table, "--fill", "0.1")
+    assert "raise --fill to 0.051" in error_line(result)
+    result, product = estimate(tmp_path, table, "--fill", "0.051")
     assert result.exit_code == 0, result.output
     assert product.exists()
 
