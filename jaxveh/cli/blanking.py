@@ -49,7 +49,8 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
                 )
             first = np.asarray(recording.time)[np.argmax(gaps)]
             needed = gap_to_fill(recording, name)
-            advice = f"{'add --fill' if max_gap is None else 'raise --fill to'} {needed:g} to fill them, or take a --span without the gap"
+            option = "add --fill" if max_gap is None else "raise --fill to"
+            advice = f"{option} {needed:g} to fill them, or take a --span without the gap"
             raise InputError(
                 f"input channel {name} is NaN in {int(gaps.sum())} rows, first at t = {first:g} s: inputs must be finite; "
                 f"{advice}."

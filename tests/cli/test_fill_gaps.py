@@ -61,7 +61,7 @@ def test_the_length_that_the_message_names_is_enough(seed):
     for given in (None, 0.05):
         with pytest.raises(InputError, match="--fill") as told:
             blanking.fill_gaps(drive, given)
-        named = re.search(r"--fill ([0-9.]+) ", str(told.value))
+        named = re.search(r"--fill (?:to )?([0-9.]+) ", str(told.value))
         assert named is not None and (given is None) == ("add --fill" in str(told.value))
         assert np.isfinite(np.asarray(blanking.fill_gaps(drive, float(named[1]))["v_x"])).all()
         with pytest.raises(InputError, match="raise --fill"):
