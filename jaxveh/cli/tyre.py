@@ -146,9 +146,8 @@ def _read(path: Path) -> Any:
     io.check_readable(path)
     try:
         frame = pd.read_csv(path)
-        names = (
-            pd.read_csv(path, header=None, nrows=1, dtype=str).iloc[0].tolist()
-        )  # pandas renames the second of a name
+        # Read again as cells, since pandas renames the second column of a name.
+        names = pd.read_csv(path, header=None, nrows=1, dtype=str).iloc[0].tolist()
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: is not a CSV table ({error}).") from None
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1 and _is_wanted(name)]:

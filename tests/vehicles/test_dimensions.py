@@ -70,7 +70,7 @@ def assert_likewise(car, small, large, rate=1.0):
         np.testing.assert_allclose(
             getattr(small, name),
             getattr(wanted, name),
-            rtol=1e-5,
+            rtol=1e-7,
             atol=at_least,
             err_msg=f"{name}, {unit_of(car, name)}",
         )
