@@ -30,6 +30,18 @@ def members(room, base):
     }
 
 
+def listed_modules(module=jaxveh, seen=None):
+    """The modules that a user reaches from the package by what each lists (`__all__`), by name without `jaxveh.`."""
+    seen = {} if seen is None else seen
+    for name in getattr(module, "__all__", ()):
+        one = getattr(module, name)
+        short = one.__name__.removeprefix("jaxveh.") if inspect.ismodule(one) else ""
+        if short and short != one.__name__ and short not in seen:
+            seen[short] = one
+            listed_modules(one, seen)
+    return seen
+
+
 def kinds_in(value, base):
     """Names of the classes of a kind that a value is or has inside, in fields, tuples and mappings."""
     found = {type(value).__name__} if isinstance(value, base) else set()

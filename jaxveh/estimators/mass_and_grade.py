@@ -26,6 +26,19 @@ NAME = "mass_and_grade"
 
 ACCELEROMETER = "a_x"
 
+__all__ = [
+    "ACCELEROMETER",
+    "NAME",
+    "SHORTEST",
+    "calibrate",
+    "car_of",
+    "chosen_parameters",
+    "estimate",
+    "live",
+    "model",
+    "needs",
+]
+
 needs = (
     Need("drive_torque", "N m", throughout=True),
     Need("brake_torque", "N m", throughout=True),

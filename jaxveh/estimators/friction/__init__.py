@@ -137,3 +137,5 @@ do_nothing = constant_of(
 )
 estimate = estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)
+
+__all__ = ["METHODS", "NAME", "RECOMMENDED", "SHOWN", "do_nothing", "estimate", "live"]

@@ -45,3 +45,5 @@ RECOMMENDED = "filter"
 do_nothing = constant_of(NAME, lambda car: {"grade": 0.0}, "Zero grade in all rows.")
 estimate = smoothable_estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)
+
+__all__ = ["METHODS", "NAME", "RECOMMENDED", "SHOWN", "do_nothing", "estimate", "live"]

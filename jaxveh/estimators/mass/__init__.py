@@ -56,3 +56,5 @@ RECOMMENDED = "filter"
 do_nothing = constant_of(NAME, lambda car: {"mass": car.mass}, "The mass of the car's file.")
 estimate = smoothable_estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)
+
+__all__ = ["METHODS", "NAME", "RECOMMENDED", "SHOWN", "do_nothing", "estimate", "live"]

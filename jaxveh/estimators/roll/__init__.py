@@ -46,3 +46,5 @@ RECOMMENDED = "filter"
 do_nothing = constant_of(NAME, lambda car: {"roll": 0.0, "roll_rate": 0.0}, "Zero roll and roll rate in all rows.")
 estimate = smoothable_estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)
+
+__all__ = ["METHODS", "NAME", "RECOMMENDED", "SHOWN", "do_nothing", "estimate", "live"]

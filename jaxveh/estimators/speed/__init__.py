@@ -102,3 +102,5 @@ def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndar
 
 estimate = estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)
+
+__all__ = ["METHODS", "NAME", "RECOMMENDED", "SHOWN", "do_nothing", "estimate", "live"]

@@ -43,3 +43,5 @@ do_nothing = constant_of(
 )
 estimate = smoothable_estimate_of(NAME, SHOWN, METHODS, RECOMMENDED)
 live = live_of(NAME, SHOWN, METHODS, RECOMMENDED)
+
+__all__ = ["METHODS", "NAME", "RECOMMENDED", "SHOWN", "do_nothing", "estimate", "live"]
