@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import os
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_finite, check_flags, check_kind, path_of
+from jaxveh._core.errors import InputError, check_finite, check_flags, check_has, check_kind, path_of
 from jaxveh._core.parameter import Parameter, put, resolve
 from jaxveh._core.parameters import Parameters
 from jaxveh._core.result import Result, code
 from jaxveh._core.version import VERSION
-from jaxveh.estimators import mass_and_grade, sideslip
 from jaxveh.estimators.contract import Calibration, Span, Told
 from jaxveh.fitting import Fit
 from jaxveh.io import kit, write_text
-
-ESTIMATORS = {module.NAME: module for module in (sideslip, mass_and_grade)}
 
 KEYS = (
     "estimator",
@@ -35,6 +34,9 @@ KEYS = (
     "parameters",
     "covariance",
 )
+
+OWN = ("NAME", "model", "chosen_parameters")
+"""What a file is read by, of the module of an estimator."""
 
 NONE = "none"
 """The text that stands for an option that is None."""
@@ -99,12 +101,16 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike, *, over
     write_text("\n".join(lines) + "\n", path, overwrite)
 
 
-def read_calibration(path: str | os.PathLike) -> Calibration:
+def read_calibration(path: str | os.PathLike, estimator: ModuleType | None = None) -> Calibration:
     """Read the calibration that `write_calibration` wrote.
 
-    **Raises** `InputError` for a file that is no calibration, is cut short, was written by another version, or holds other
-    parameters than the estimator fits.
+    `estimator`: the module of an estimator of one's own; by default the one of this package that the file names.
+
+    **Raises** `InputError` for a file that is no calibration, is cut short, was written by another version, is of another
+    estimator, or holds other parameters than the estimator fits.
     """
+    if estimator is not None:
+        check_has("estimator", estimator, OWN, "Give the module, as it was imported.")
     path = path_of(path)
     content = kit.read_toml(path)
     kit.check_file(path, content, "calibration", KEYS)
@@ -114,7 +120,7 @@ def read_calibration(path: str | os.PathLike) -> Calibration:
         raise InputError(f"{path}: no {', '.join(missing)}: this is not a calibration, or it is cut short; fit again.")
     try:
         _check_version(kit.toml_text("version", content["version"]))
-        return _calibration(content, path.parent)
+        return _calibration(content, path.parent, estimator)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
@@ -124,10 +130,22 @@ def _check_version(version: str) -> None:
         raise InputError(f"version = {version!r}: the calibration was not written by version {VERSION}; fit again.")
 
 
-def _calibration(content: dict[str, Any], folder: Path) -> Calibration:
+def _module(name: str, own: ModuleType | None) -> Any:
+    """The module of the estimator that a file names. The package's own are found in its list, so that none is forgotten."""
+    if own is not None:
+        if name != own.NAME:
+            raise InputError(f"the calibration is of {name}: must be of {own.NAME}, the estimator that was given.")
+        return own
+    room = importlib.import_module("jaxveh.estimators")
+    there = {one: getattr(room, one) for one in room.__all__ if hasattr(getattr(room, one), "calibrate")}
+    own_advice = "Of an estimator of your own give the module, too: read_calibration(path, module)."
+    kit.check_known("the calibration", "estimator", name, there, own_advice)
+    return there[name]
+
+
+def _calibration(content: dict[str, Any], folder: Path, own: ModuleType | None) -> Calibration:
     name = kit.toml_text("estimator", content["estimator"])
-    kit.check_known("the calibration", "estimator", name, ESTIMATORS)
-    module = ESTIMATORS[name]
+    module = _module(name, own)
     options = {key: None if value == NONE else value for key, value in _table("options", content).items()}
     told = Told(kit.car_of_toml(content["car"], "[car]", folder), tuple(options.items()))
     kit.check_keys("[options]", options, inspect.signature(module.model).parameters)

@@ -1,7 +1,8 @@
 """The definition of an estimator of a quantity, and what all estimators share.
 
-An estimator is a module of `jaxveh.estimators`, named after the quantity, with seven names, whose first arguments are:
+An estimator is a module of `jaxveh.estimators`, named after the quantity, with eight names, whose first arguments are:
 
+- `NAME`: the name of the module, which messages and files of calibrations have.
 - `needs`: a tuple of `Need`, the channels that it reads and their units.
 - `car_of(car)`: the vehicle model of the estimator, built from a car's file without calibration.
 - `model(car, ...) -> StateSpace`: the state space that a filter uses. `car`: an `io.CarSpecification`, or the vehicle model of
@@ -138,9 +139,9 @@ class Calibration(Shown, eqx.Module):
         above("estimators", "write_calibration")(self, path, overwrite=overwrite)
 
     @classmethod
-    def load(cls, path: str | os.PathLike) -> Calibration:
+    def load(cls, path: str | os.PathLike, estimator: Any = None) -> Calibration:
         """Read the calibration that `save` wrote; see `read_calibration`."""
-        return above("estimators", "read_calibration")(path)
+        return above("estimators", "read_calibration")(path, estimator)
 
     def _labelled(self) -> Labelled:
         return self.fit._labelled()
