@@ -101,7 +101,7 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike, *, over
     write_text("\n".join(lines) + "\n", path, overwrite)
 
 
-def read_calibration(path: str | os.PathLike, estimator: ModuleType | None = None) -> Calibration:
+def read_calibration(path: str | os.PathLike, *, estimator: ModuleType | None = None) -> Calibration:
     """Read the calibration that `write_calibration` wrote.
 
     `estimator`: the module of an estimator of one's own; by default the one of this package that the file names.
@@ -138,7 +138,7 @@ def _module(name: str, own: ModuleType | None) -> Any:
         return own
     room = importlib.import_module("jaxveh.estimators")
     there = {one: getattr(room, one) for one in room.__all__ if hasattr(getattr(room, one), "calibrate")}
-    own_advice = "Of an estimator of your own give the module, too: read_calibration(path, module)."
+    own_advice = f"If it is your own, give its module: read_calibration(path, estimator={name})."
     kit.check_known("the calibration", "estimator", name, there, own_advice)
     return there[name]
 

@@ -139,9 +139,9 @@ class Calibration(Shown, eqx.Module):
         above("estimators", "write_calibration")(self, path, overwrite=overwrite)
 
     @classmethod
-    def load(cls, path: str | os.PathLike, estimator: Any = None) -> Calibration:
+    def load(cls, path: str | os.PathLike, *, estimator: Any = None) -> Calibration:
         """Read the calibration that `save` wrote; see `read_calibration`."""
-        return above("estimators", "read_calibration")(path, estimator)
+        return above("estimators", "read_calibration")(path, estimator=estimator)
 
     def _labelled(self) -> Labelled:
         return self.fit._labelled()

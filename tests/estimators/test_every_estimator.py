@@ -388,17 +388,17 @@ def test_a_calibration_of_one_s_own_estimator_is_read_by_its_module(tmp_path):
         vars(module).update(vars(estimators.mass_and_grade), NAME=module.__name__)
     made, path = calibration_of(own, case_of("mass_and_grade")), tmp_path / "calibration.toml"
     made.save(path)
-    for kept in (estimators.read_calibration(path, own), estimators.Calibration.load(path, own)):
+    for kept in (estimators.read_calibration(path, estimator=own), estimators.Calibration.load(path, estimator=own)):
         assert kept.estimator == "own" and kept.told == made.told
         for a, b in zip(jax.tree.leaves(kept), jax.tree.leaves(made), strict=True):
             np.testing.assert_array_equal(a, b)
     for given, message in (
-        ((), r"toml: the calibration: no estimator 'own'; .* give the module, too: read_calibration\(path, module\)"),
-        ((other,), "toml: the calibration is of own: must be of other, the estimator that was given"),
-        (("own",), "estimator = 'own': must be an object with NAME, .* Give the module"),
+        (None, r"no estimator 'own'; .* If it is your own, give its module: read_calibration\(path, estimator=own\)"),
+        (other, "toml: the calibration is of own: must be of other, the estimator that was given"),
+        ("own", "estimator = 'own': must be an object with NAME, .* Give the module"),
     ):
         with pytest.raises(InputError, match=message):
-            estimators.read_calibration(path, *given)
+            estimators.read_calibration(path, estimator=given)
 
 
 @every
