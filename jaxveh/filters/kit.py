@@ -32,6 +32,7 @@ from jaxveh.filters.particle import (
 )
 from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
 from jaxveh.filters.wrappers.base import (
+    AbstractLearnedNoise,
     AbstractRemembering,
     Remembering,
     gaussian_of,
@@ -40,6 +41,7 @@ from jaxveh.filters.wrappers.base import (
     with_variances,
 )
 from jaxveh.filters.wrappers.innovation import Innovation, innovation
+from jaxveh.filters.wrappers.robust import AbstractReweighting
 from jaxveh.filters.wrappers.wavelet import NORMAL_MEDIAN, Window, first_window, row_values, window_after
 from jaxveh.statespace import (
     AbstractBelief,
@@ -75,11 +77,13 @@ __all__ = [
     "AbstractForm",
     "AbstractGaussianFilter",
     "AbstractGaussianWrapper",
+    "AbstractLearnedNoise",
     "AbstractOuterBelief",
     "AbstractParticleFilter",
     "AbstractProposalFilter",
     "AbstractRemembering",
     "AbstractResampling",
+    "AbstractReweighting",
     "AbstractRule",
     "AbstractRuleFilter",
     "AbstractStateless",

@@ -39,6 +39,7 @@ CLASSES = [
 FILTERS = EVERY | {
     "paused": Line(lambda: filters.Paused(filters.Cubature(), "force", {"x0": 1.0}), exact=False),
 }
+LEARNERS = [cls for cls in CLASSES if issubclass(cls, filters.kit.AbstractLearnedNoise)]
 FLAGS = ("whitens", "noise_by_row", "rows_between")
 HUGE, ROW = 1e6, 12
 
@@ -166,6 +167,10 @@ def test_a_filter_with_a_noise_of_its_own_is_refused(name):
             continue
         with pytest.raises(InputError, match=rf"{kind} inside it does not take .* Put \w+ inside: {kind}\("):
             outer(filter_named(name)).check(model)
+    for outer in LEARNERS:
+        if isinstance(filter_named(name), filters.AbstractGaussianFilter):
+            with pytest.raises(InputError, match=rf"{outer.__name__}: {kind} inside .* would do nothing. Take one of"):
+                outer(filter_named(name)).check(model)
 
 
 def turn(system, t0, t1, x, u):

@@ -1,10 +1,12 @@
 """What resampling schemes, covariance forms and noise laws declare is what they do: each member of `__all__`, both ways."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from families import left_out, members
+from filter_systems import nile_model
 from nonlinear_systems import LogChiSquared
 from test_every_filter import linear, recordings
 
@@ -115,7 +117,7 @@ def test_a_form_does_what_it_declares(name):
 
     @jax.jit
     def spreads(covariance, deviations, root):
-        image = filters.kit.Image(jnp.zeros(3), deviations, root, None)
+        image = kit.Image(jnp.zeros(3), deviations, root, None)
         return form.start(covariance), form.add(image, None, ("a", "b", "c"))
 
     found = jax.tree.map(np.asarray, spreads(covariance, deviations, root))
@@ -168,3 +170,51 @@ def test_continuous_noise_is_of_laws_that_add_up(name):
         return
     with pytest.raises(InputError, match=r"\w+ as process noise is the law of one step: wrap it in Discrete"):
         ss.Continuous(law)
+
+
+class Doubting(kit.AbstractReweighting):
+    """Of a user."""
+
+    inner: filters.AbstractGaussianFilter
+
+    def update(self, model, belief, row):
+        return self.inner.update(kit.with_variances(model, 2.0 * kit.variances_of(model)), belief, row)
+
+
+class Following(kit.AbstractLearnedNoise):
+    """Of a user."""
+
+    inner: filters.AbstractGaussianFilter
+
+    def start(self, model):
+        return kit.variances_of(model)
+
+    def believed_model(self, model, memory):
+        return kit.with_variances(model, memory)
+
+    def update(self, model, belief, row):
+        return self.update_inside(model, belief, row)
+
+
+DEPENDENT = ss.StateDependent(lambda system, t, x, u: {"x": 0.5}, "x")
+
+
+@pytest.mark.parametrize("law", [*LAWS, "of the state"])
+def test_a_user_s_wrapper_of_the_noise_says_which_laws_it_cannot_change(law):
+    noise = (LAWS | {"of the state": DEPENDENT})[law]
+    model = eqx.tree_at(lambda m: m.measurement_noise, nile_model(), noise, is_leaf=lambda node: node is None)
+    kind = rf"measurement noise (is {type(noise).__name__}: must be Gaussian|of x depends on the state)"
+    for wrapper in (Doubting, Following):
+        if law == "normal":
+            wrapper(filters.Kalman()).check(nile_model())
+            continue
+        with pytest.raises(InputError, match=f"{wrapper.__name__}: the {kind}"):
+            wrapper(filters.Kalman()).check(model)
+    if law in ("normal", "mixed"):
+        np.testing.assert_allclose(kit.variances_of(model), [np.square(float(noise.std.x))])
+        changed = kit.with_variances(model, np.array([9.0]))
+        np.testing.assert_allclose(changed.measurement_noise.std.x, 3.0)
+        return
+    for look in (kit.variances_of, lambda model: kit.with_variances(model, np.ones(2))):
+        with pytest.raises(InputError, match=r"measurement noise is \w+: must be Gaussian.* kit.AbstractReweighting"):
+            look(model)

@@ -12,7 +12,7 @@ from jaxveh._core.own_results import instance_of, not_none
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
 from jaxveh.filters.outer_belief import AbstractTransparentBelief
-from jaxveh.statespace import Gaussian, Info, Row, StateSpace, kit
+from jaxveh.statespace import CauchyGaussianMixture, Gaussian, Info, Row, StateSpace, kit
 
 
 class Remembering(AbstractTransparentBelief):
@@ -65,12 +65,18 @@ class AbstractRemembering(AbstractGaussianWrapper):
 
 class AbstractLearnedNoise(AbstractRemembering):
     """A filter around another that estimates the variances of the measurement noise, which must be Gaussian with one
-    standard deviation per channel."""
+    standard deviation per channel. A filter inside that estimates them too would use its own, and is refused."""
 
     rows_between: ClassVar[bool] = True
 
     def check(self, model):
-        check_independent(type(self).__name__, model)
+        who = type(self).__name__
+        check_independent(who, model)
+        if (kind := kit.who_lacks(self.inner, "noise_by_row")) is not None:
+            raise InputError(
+                f"{who}: {kind} inside it does not take its measurement noise row by row (`noise_by_row`), and would use its "
+                f"own: {who} would do nothing. Take one of the two."
+            )
         self.inner.check(model)
 
 
@@ -96,12 +102,26 @@ def check_independent(who: str, model: StateSpace) -> None:
         raise InputError(f"{who}: the measurement noise is {kind}: must be Gaussian, a standard deviation per channel.")
 
 
+def check_has_levels(who: str, model: StateSpace) -> None:
+    """Raise `InputError` unless the measurement noise has a standard deviation per channel, as a Gaussian or a Gaussian part."""
+    if not isinstance(model.measurement_noise, Gaussian | CauchyGaussianMixture):
+        kind = type(model.measurement_noise).__name__
+        raise InputError(
+            f"{who}: the measurement noise is {kind}: must be Gaussian, a standard deviation per channel. Let the wrapper refuse "
+            "it first: derive it from kit.AbstractReweighting or kit.AbstractLearnedNoise."
+        )
+
+
 def variances_of(model: StateSpace) -> Any:
-    """The measurement noise's variances (m,), in the order of the channels."""
+    """The measurement noise's variances (m,), in the order of the channels; of a `CauchyGaussianMixture` those of its Gaussian
+    part. **Raises** `InputError` for another law."""
+    check_has_levels("variances_of", model)
     return jnp.square(jnp.stack(model.measurement_noise.std))
 
 
 def with_variances(model: StateSpace, variances: Any) -> StateSpace:
-    """The model with these variances (m,) of the measurement noise."""
+    """The model with these variances (m,) of the measurement noise; of a `CauchyGaussianMixture` of its Gaussian part.
+    **Raises** `InputError` for another law."""
+    check_has_levels("with_variances", model)
     kind = type(model.measurement_noise.std)
     return eqx.tree_at(lambda m: m.measurement_noise.std, model, kind(*jnp.sqrt(variances)))

@@ -23,7 +23,8 @@ from jaxveh.statespace import Smoothing, kit
 
 class AbstractReweighting(AbstractStateless):
     """A filter around another that takes a row's noise to be larger where a residual is larger. The noise must be
-    Gaussian, with one standard deviation per channel."""
+    Gaussian, with one standard deviation per channel. A filter inside that estimates the noise would use its own, and is
+    refused. A subclass writes `update`."""
 
     rows_between: ClassVar[bool] = True
 
