@@ -63,12 +63,13 @@ def left_out(room, base, values, exempt):
     return wanting(members(room, base), {name for name in there if name in members(room, base)}, exempt)
 
 
-def wanting(wanted, there, exempt):
-    """The names of a family that a table lacks, has too much, or exempts in vain, each with what to do."""
+def wanting(wanted, there, exempt, where="here"):
+    """The names of a family that a table lacks, has too much, or exempts in vain, each with what to do. `where`: the table, if it
+    is in another file than the reasons."""
     return [
-        *(f"{name}: has no line here: add one, or a reason why not (CONTRIBUTING, Five recipes)"
+        *(f"{name}: has no line {where}: add one, or a reason why not (CONTRIBUTING, Five recipes)"
           for name in sorted(wanted - there - set(exempt))),
-        *(f"{name}: has a line here, but is not listed: remove the line, or list it" for name in sorted(there - wanted)),
+        *(f"{name}: has a line {where}, but is not listed: remove the line, or list it" for name in sorted(there - wanted)),
         *(f"{name}: has a reason why not, but is not listed: remove the reason" for name in sorted(set(exempt) - wanted)),
         *(f"{name}: has a line and a reason why not: remove one" for name in sorted(set(exempt) & there)),
     ]  # fmt: skip

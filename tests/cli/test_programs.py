@@ -1,6 +1,7 @@
 """Each program once from end to end, at smoke size: what it prints, what it writes, that the numbers agree."""
 
 import dataclasses
+import importlib
 import json
 import re
 from types import SimpleNamespace
@@ -653,5 +654,6 @@ def test_reproduce_names_its_papers():
         assert name in result.stderr
     for name in PAPERS:
         experiment = _experiment(name)
-        for needed in ("CITATION", "CRITERIA", "as_printed", "check", "run", "settings", "tables"):
+        for needed in ("CITATION", "CRITERIA", "Study", "as_printed", "check", "run", "settings", "tables"):
             assert hasattr(experiment, needed), f"{name} has no {needed}"
+        assert callable(importlib.import_module(f"{experiment.__name__}.figures").figures)

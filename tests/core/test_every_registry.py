@@ -8,7 +8,7 @@ import pytest
 from families import kinds_in, members, wanting
 
 import jaxveh
-from jaxveh import experiments, fitting, manoeuvres, roads, tyres, vehicles
+from jaxveh import estimators, experiments, fitting, manoeuvres, roads, tyres, vehicles
 from jaxveh.cli.reproduce import PAPERS
 from jaxveh.tyres.parameters_file import MODELS
 
@@ -23,7 +23,9 @@ def test_a_parameter_file_holds_every_law_of_plain_numbers():
         "MFTyre": "has a property file of its own",
         "TMeasy": "has a curve for each direction and load, and no flat table of numbers",
     }
-    assert not wanting(members("tyres", tyres.AbstractTyre), set(MODELS), exempt)
+    assert not wanting(
+        members("tyres", tyres.AbstractTyre), set(MODELS), exempt, "in MODELS of tyres/parameters_file.py"
+    )
 
 
 def test_a_rig_fit_starts_from_every_law_that_a_rig_can_tell():
@@ -40,7 +42,7 @@ def test_a_rig_fit_starts_from_every_law_that_a_rig_can_tell():
         "Parabolic": "the brush model by another name: brush",
         "TMeasy": "its curves are read off by hand, not fitted",
     }
-    assert not wanting(members("tyres", tyres.AbstractTyre), started, exempt)
+    assert not wanting(members("tyres", tyres.AbstractTyre), started, exempt, "in RIG_STARTS of fitting/rig_start.py")
 
 
 def test_every_manoeuvre_has_a_name():
@@ -57,7 +59,7 @@ def test_every_manoeuvre_has_a_name():
         "as_driver": "makes a driver of any manoeuvre",
         "replay": "needs a recording (--replay)",
     }
-    assert not wanting(set(public), set(made), exempt)
+    assert not wanting(set(public), set(made), exempt, "in MANOEUVRES of manoeuvres/named.py")
 
 
 def test_every_road_has_a_name():
@@ -66,13 +68,21 @@ def test_every_road_has_a_name():
           for road in roads.ROADS.values())
     )  # fmt: skip
     exempt = {"Combined": "joins others", "Hill": "a road file has its heights", "Profile": "is what a road file makes"}
-    assert not wanting(members("roads", roads.AbstractRoad), named, exempt)
+    assert not wanting(members("roads", roads.AbstractRoad), named, exempt, "in ROADS of roads/named.py")
 
 
 def test_every_paper_has_a_name():
     folders = {path.parent.name for path in pathlib.Path(experiments.__file__).parent.glob("*/__init__.py")}
-    assert not wanting(folders, {name.replace("-", "_") for name in PAPERS}, {})
+    assert not wanting(folders, {name.replace("-", "_") for name in PAPERS}, {}, "in PAPERS of cli/reproduce.py")
     assert folders <= set(experiments.__all__)
+
+
+def test_the_readme_counts_what_there_is():
+    readme = (pathlib.Path(jaxveh.__file__).parents[1] / "README.md").read_text()
+    laws = members("tyres", tyres.AbstractTyre) - set(ONE_LAW)
+    methods = [method for name in estimators.__all__ for method in getattr(getattr(estimators, name), "METHODS", ())]
+    for number, what in ((len(laws), "laws"), (len(methods), "methods")):
+        assert f"[{number} {what}]" in readme, f"README.md: there are {number} {what}"
 
 
 def test_every_vehicle_can_be_made_by_name():
@@ -84,7 +94,9 @@ def test_every_vehicle_can_be_made_by_name():
         "Steered": "goes around another: --steering",
         "Travelling": "goes around another, which it gives a place",
     }
-    assert not wanting(members("vehicles", vehicles.AbstractVehicle), kinds, exempt)
+    assert not wanting(
+        members("vehicles", vehicles.AbstractVehicle), kinds, exempt, "in FIDELITIES of vehicles/sets/named.py"
+    )
 
 
 @pytest.mark.parametrize("room", ["filters", "observers", "tyres", "vehicles", "sensors", "roads", "manoeuvres"])

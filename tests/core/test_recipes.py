@@ -5,7 +5,7 @@ import inspect
 import re
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import pytest
 
@@ -18,6 +18,7 @@ NEW = {
     "filter or wrapper": ("filters", lambda: type("Newcomer", (jaxveh.filters.ParticleFilter,), {})),
     "vehicle": ("vehicles", lambda: type("Newcomer", (jaxveh.vehicles.SingleTrack,), {})),
     "estimator": ("estimators", lambda: ModuleType("Newcomer")),
+    "paper": ("experiments", lambda: SimpleNamespace(run=None)),
 }
 
 

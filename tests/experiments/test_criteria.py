@@ -63,7 +63,9 @@ def test_a_check_of_every_criterion_has_its_terms(name):
 
 def row_of(name: str) -> list[str]:
     """The cells of a paper's row in the page's table."""
-    (line,) = (line for line in PAGE.read_text().splitlines() if line.startswith(f"| [`{name}`]"))
+    lines = [line for line in PAGE.read_text().splitlines() if line.startswith(f"| [`{name}`]")]
+    assert len(lines) == 1, f"{PAGE}: must have one row of `{name}` in its table, and has {len(lines)}"
+    (line,) = lines
     return [cell.strip() for cell in line.strip("|").split("|")]
 
 
@@ -71,8 +73,9 @@ def section_of(name: str) -> str:
     """The page's section about a paper, to which its row links."""
     title = re.search(r"\(#([\w-]+)\)", row_of(name)[0])[1]
     sections = PAGE.read_text().split("\n## ")[1:]
-    (found,) = (text for text in sections if text.splitlines()[0].lower().replace(" ", "-") == title)
-    return found
+    found = [text for text in sections if text.splitlines()[0].lower().replace(" ", "-") == title]
+    assert len(found) == 1, f"{PAGE}: must have one section #{title} of `{name}`, and has {len(found)}"
+    return found[0]
 
 
 @pytest.mark.parametrize("name", PAPERS)
@@ -92,7 +95,8 @@ def test_readme_sums_the_papers_up():
     readme = (PAGE.parents[2] / "README.md").read_text()
     held, of = map(int, re.search(r"(\d+) of (\d+) criteria hold", readme).groups())
     counts = [list(map(int, re.findall(r"\d+", row_of(name)[1])[:2])) for name in PAPERS]
-    assert [held, of] == [sum(column) for column in zip(*counts, strict=True)]
+    sums = [sum(column) for column in zip(*counts, strict=True)]
+    assert [held, of] == sums, f"README.md: {held} of {of} criteria hold; {PAGE.name} sums to {sums[0]} of {sums[1]}"
 
 
 @pytest.mark.parametrize(("make", "value", "bound", "status"), [

@@ -4,9 +4,11 @@
 """
 
 import importlib
+import importlib.util
 from pathlib import Path
 
 import pytest
+from families import wanting
 
 from jaxveh import estimators, experiments
 from jaxveh.experiments.systems import resolve_name, systems_page
@@ -29,7 +31,7 @@ TITLES = {
 SYSTEMS = {
     name: importlib.import_module(f"jaxveh.experiments.{name}.systems").SYSTEMS
     for name in experiments.__all__
-    if hasattr(getattr(experiments, name), "run")
+    if name != "report" and importlib.util.find_spec(f"jaxveh.experiments.{name}.systems")
 }
 
 
@@ -38,7 +40,9 @@ def page():
 
 
 def test_every_paper_says_where_its_systems_are():
-    assert set(SYSTEMS) == set(TITLES) and len(SYSTEMS) == 5
+    papers = {name for name in experiments.__all__ if hasattr(getattr(experiments, name), "run")}
+    assert not [f"{name}: has no `systems.py`: write it (CONTRIBUTING, Five recipes)" for name in papers - set(SYSTEMS)]
+    assert not wanting(papers, set(TITLES), {})
 
 
 @pytest.mark.parametrize("paper", SYSTEMS)
@@ -57,7 +61,7 @@ def test_every_method_of_the_library_belongs_to_a_system():
         methods = getattr(getattr(estimators, quantity), "METHODS", {})
         for method in methods:
             name = f"estimators.{quantity}.METHODS[{method}]"
-            assert name in named | OURS, name
+            assert name in named | OURS, f"{name}: is in no paper's `systems.py`: put it there, or among OURS"
 
 
 OURS = {
@@ -75,6 +79,7 @@ def test_a_name_that_is_nothing_is_said():
 
 
 def test_the_page_is_what_the_papers_declare():
+    """`python tests/experiments/test_systems.py` writes it anew."""
     assert PAGE.read_text() == page()
 
 
