@@ -44,6 +44,11 @@ def check_declared(test_file, name, one):
         if isinstance(field.default, bool | int | float | str | np.ndarray):
             about["default"] = field.default
         found[field.name] = " ".join(f"{key}={value}" for key, value in about.items())
+    check_words(test_file, name, found)
+
+
+def check_words(test_file, name, found):
+    """Compare texts by name with those on record for `name`, or record them where JAXVEH_RECORD is set."""
     path = _declared(test_file)
     known = json.loads(path.read_text()) if path.exists() else {}
     if os.environ.get("JAXVEH_RECORD"):

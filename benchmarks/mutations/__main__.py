@@ -24,7 +24,7 @@ import threading
 import time
 from pathlib import Path
 
-from .choosing import choose, lines_beside, measured, never_executed, test_files
+from .choosing import SETTINGS, choose, lines_beside, measured, never_executed, on_import, test_files
 from .mutate import SWAPS, Mutation, mutations
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -85,7 +85,7 @@ def main(arguments: list[str] | None = None) -> int:
         look = lambda file: measured(ROOT, options.kept, file, env, LONGEST, options.selected)
         rooms = {Path(room).name for room in ROOMS}
         near = lambda file: not options.own or Path(file).parts[1] in rooms
-        asked = [file for file in test_files(ROOT) if options.tests in file and near(file)]
+        asked = [file for file in test_files(ROOT) if (options.tests in file and near(file)) or file == SETTINGS]
         measurements = dict(zip(asked, pool.map(look, asked), strict=True))
     for file, names in never_executed(ROOT, measurements, [p for p in sources() if options.only in p]).items():
         print(f"{'not executed':>12}  {file}: {', '.join(names)}", flush=True)
@@ -184,7 +184,8 @@ def tried(mutation: Mutation, measurements: dict, root: Path, options) -> str:
     """
     path = root / mutation.file
     source = path.read_text()
-    files = choose(measurements, mutation.file, lines_beside(source, mutation.line), options.own)
+    lines, imported = lines_beside(source, mutation.line), on_import(source, mutation.line)
+    files = choose(measurements, mutation.file, lines, options.own, imported)
     if not files:
         return "not covered"
     path.write_text(mutation.applied(source))

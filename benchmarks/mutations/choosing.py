@@ -24,12 +24,14 @@ FOLDERS = (
 )
 """Folders of tests that are measured."""
 
+SETTINGS = "tests/core/test_recorded_settings.py"
+"""The tests of what modules set on import, constants and defaults, which they read without executing a function."""
+
 
 def test_files(root: Path) -> list[str]:
-    """Return the test files of these folders, relative to the root."""
-    return sorted(
-        str(path.relative_to(root)) for folder in FOLDERS for path in (root / "tests" / folder).glob("test_*.py")
-    )
+    """Return the test files of these folders and `SETTINGS`, relative to the root."""
+    inside = [str(path.relative_to(root)) for folder in FOLDERS for path in (root / "tests" / folder).glob("test_*.py")]
+    return sorted([*inside, SETTINGS])
 
 
 def measured(
@@ -90,19 +92,32 @@ def _lines_of_code(function: ast.FunctionDef) -> set[int]:
     return {line for node in code for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)}
 
 
-def choose(measurements: dict[str, dict], file: str, lines: set[int], own: bool = False) -> list[str]:
+def choose(
+    measurements: dict[str, dict], file: str, lines: set[int], own: bool = False, imported: bool = False
+) -> list[str]:
     """Return the test files that execute one of the lines: first those of its own folder, recorded numbers and quick ones first.
 
-    `own`: only those of its own folder.
+    `own`: only those of its own folder. `imported`: the change is of a line that runs on import, so that `SETTINGS` is asked
+    before the others.
     """
     room = Path(file).parts[1]
     hit = [name for name, about in measurements.items() if lines & set(about["lines"].get(file, ()))]
     recorded = lambda name: Path(name).name.startswith("test_recorded")
     if own:
         hit = [name for name in hit if Path(name).parts[1] == room]
-    return sorted(
-        hit, key=lambda name: (Path(name).parts[1] != room, not recorded(name), measurements[name]["seconds"])
-    )
+    hit = [*{*hit, *[SETTINGS] * imported}]
+    key = lambda name: (Path(name).parts[1] != room, not recorded(name), measurements[name]["seconds"])
+    return sorted(hit, key=lambda name: (not (imported and name == SETTINGS), key(name)))
+
+
+def on_import(source: str, line: int) -> bool:
+    """Return whether a line runs on import: it is in no function's body."""
+    return line not in _bodies(ast.parse(source))
+
+
+def _bodies(tree: ast.AST) -> set[int]:
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    return {i for node in functions for i in range(node.body[0].lineno, (node.end_lineno or 0) + 1)}
 
 
 def lines_beside(source: str, line: int) -> set[int]:
@@ -112,8 +127,7 @@ def lines_beside(source: str, line: int) -> set[int]:
     it.
     """
     tree = ast.parse(source)
-    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-    bodies = {i for node in functions for i in range(node.body[0].lineno, (node.end_lineno or 0) + 1)}
+    bodies = _bodies(tree)
     if line not in bodies:
         return bodies or {line}
     around = [

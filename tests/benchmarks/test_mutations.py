@@ -4,7 +4,7 @@ import ast
 from textwrap import dedent
 
 from benchmarks.mutations.__main__ import ROOT, draw
-from benchmarks.mutations.choosing import choose, lines_beside, never_executed
+from benchmarks.mutations.choosing import SETTINGS, choose, lines_beside, never_executed, on_import
 from benchmarks.mutations.mutate import mutations
 
 SOURCE = '''"""A text with 1 + 1 in it."""
@@ -70,6 +70,23 @@ def test_tests_of_the_own_room_come_first_and_quick_ones_before_slow_ones():
     found = choose(measurements, "jaxveh/tyres/brush.py", {11})
     assert found == ["tests/tyres/test_quick.py", "tests/tyres/test_slow.py", "tests/vehicles/test_a.py"]
     assert choose(measurements, "jaxveh/tyres/brush.py", {12}) == []
+
+
+def test_recorded_settings_are_asked_first_of_what_runs_on_import():
+    at = {"jaxveh/tyres/brush.py": [10, 11]}
+    measurements = {
+        "tests/tyres/test_quick.py": {"seconds": 2.0, "lines": at},
+        SETTINGS: {"seconds": 5.0, "lines": {}},
+    }
+    for own in (False, True):
+        found = choose(measurements, "jaxveh/tyres/brush.py", {11}, own, imported=True)
+        assert found == [SETTINGS, "tests/tyres/test_quick.py"]
+        assert choose(measurements, "jaxveh/tyres/brush.py", {11}, own) == ["tests/tyres/test_quick.py"]
+    assert (ROOT / SETTINGS).exists()
+    lines = SOURCE.split("\n")
+    assert [line for line, text in enumerate(lines, 1) if text.strip() and not on_import(SOURCE, line)] == [
+        8, 12, 13, 14, 15, 16,
+    ]  # fmt: skip
 
 
 def test_a_line_is_executed_with_its_statement_and_one_of_the_module_with_its_functions():
