@@ -287,14 +287,19 @@ def _combined_findings(tyre: MFTyre) -> Iterator[PropertyFinding]:
     alone_x, alone_y = force(0 * angle, -ratio).F_x, force(angle, 0 * ratio).F_y - force(-angle, 0 * ratio).F_y
     # The force that slip ratio adds to F_y is the same at both slip angles, so that their difference does not contain it.
     for about, name, weight, slip in (
-        ("RBX1 to RHX1", "F_x", np.asarray(brakes.F_x / alone_x), np.degrees(angle)),
-        ("RBY1 to RHY2", "F_y", np.asarray((brakes.F_y - turns.F_y) / alone_y), -ratio),
+        ("RBX1 to RHX1", "F_x", _share(brakes.F_x, alone_x, load), np.degrees(angle)),
+        ("RBY1 to RHY2", "F_y", _share(brakes.F_y - turns.F_y, alone_y, load), -ratio),
     ):
         if weight.min() < 0:
             worst, unit = np.unravel_index(weight.argmin(), weight.shape), " degrees" if name == "F_x" else ""
             what = "slip angle" if name == "F_x" else "slip ratio"
             says = f"reverse {name}: {weight.min():.3g} of it remains at {load[worst]:.0f} N and a {what} of"
             yield PropertyFinding(about, f"{says} {slip[worst]:.3g}{unit}; must be positive")
+
+
+def _share(force: jax.Array, alone: jax.Array, load: np.ndarray) -> np.ndarray:
+    """What the other slip leaves of a force; 1 where there is none to reverse, as with a friction of zero."""
+    return np.divide(force, alone, out=np.ones(load.shape), where=np.abs(alone) > 1e-9 * load)
 
 
 def _moments(tyre: MFTyre) -> Iterator[PropertyFinding]:

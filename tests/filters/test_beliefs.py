@@ -1,10 +1,13 @@
 """What every kind of belief says of itself: its standard deviations are those of its covariance, its draws have its mean."""
 
+import functools
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from recorded_numbers import check_recorded
 from test_every_filter import FILTERS, batch
 
 from jaxveh.filters.delayed import _first
@@ -35,13 +38,19 @@ def test_every_kind_of_belief_is_looked_at():
     assert kinds(AbstractBelief) == {*BELIEFS.values(), *NO_COVARIANCE}
 
 
-@pytest.mark.parametrize("name", BELIEFS)
-def test_standard_deviations_are_those_of_the_covariance_and_draws_have_the_mean(name):
+@functools.cache
+def made(name):
+    """A filter's belief after the first row."""
     filter_, linear = FILTERS[name].make(), FILTERS[name].linear
     model, rows = batch("linear" if linear else "pendulum")
     row = jax.tree.map(lambda leaf: leaf[0, 0], rows)
     row = row._replace(u=jax.tree.map(lambda force: 0.1 + abs(force), row.u))
-    belief, _ = eqx.filter_jit(lambda row, key: filter_.init(model, row, key))(row, jax.random.key(5))
+    return eqx.filter_jit(lambda row, key: filter_.init(model, row, key))(row, jax.random.key(5))[0]
+
+
+@pytest.mark.parametrize("name", BELIEFS)
+def test_standard_deviations_are_those_of_the_covariance_and_draws_have_the_mean(name):
+    belief = made(name)
     assert type(belief).__name__ == BELIEFS[name]
     covariance, std = np.asarray(belief.covariance), np.asarray(belief.std)
     np.testing.assert_allclose(std**2, np.diag(covariance), rtol=1e-9)
@@ -49,6 +58,12 @@ def test_standard_deviations_are_those_of_the_covariance_and_draws_have_the_mean
     off = (draws.mean(axis=1) - np.asarray(belief.mean)) / (std / 4000**0.5)
     assert np.abs(off).max() < 4.0
     np.testing.assert_allclose(draws.std(axis=1), std, rtol=0.1)
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize("name", BELIEFS)
+def test_draws_are_those_recorded(name):
+    check_recorded(__file__, name, {"draws": made(name).sample(jax.random.key(2), 5)})
 
 
 @pytest.mark.parametrize(

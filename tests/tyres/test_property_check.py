@@ -168,6 +168,7 @@ def test_a_good_file_gives_no_alarm(text):
         ("REY1 = -1", "REY1 = 1.1", "REY1, REY2 give a curvature factor E of 1.1 at"),
         ("QCZ1 = 1.1", "QCZ1 = 0", "QCZ1 is 0: the shape factor of the trail must be positive"),
         ("QBZ2 = -1", "QBZ2 = -8", "QBZ1 to QBZ3 give a slope of the trail of -2 at 10000 N"),
+        ("QBZ1 = 10\nQBZ2 = -1", "QBZ1 = 0", "QBZ1 to QBZ3 give a slope of the trail of 0 at 400 N"),
         ("RCX1 = 0.9", "RCX1 = 1.6", "RBX1 to RHX1 reverse F_x: "),
         ("RCY1 = 1\n", "RCY1 = 1.6\n", "RBY1 to RHY2 reverse F_y: "),
         ("QSX13 = 0", "QSX13 = 0.1", "QSX13 are not 0, nor are QSX1 to QSX11"),
@@ -197,6 +198,7 @@ STIFF = "VERTICAL_STIFFNESS = 200000"
         ("PKY1 = -20", "PKY1 = -73", "PKY1 = -77", "cornering stiffness over load"),
         ("PKY1 = -20", "PKY1 = -3.9", "PKY1 = -3.6", "cornering stiffness over load"),
         ("QCZ1 = 1.1", "QCZ1 = 0.1", "QCZ1 = 0", "QCZ1 is 0"),
+        ("QBZ1 = 10\nQBZ2 = -1", "QBZ1 = 0.1", "QBZ1 = -0.1", "QBZ1 to QBZ3"),
         (STIFF, "VERTICAL_STIFFNESS = 65000", "VERTICAL_STIFFNESS = 62000", "deflection over radius"),
         (STIFF, "VERTICAL_STIFFNESS = 1250000", "VERTICAL_STIFFNESS = 1300000", "deflection over radius"),
         ("QDZ1 = 0.1", "QDZ1 = 0.29", "QDZ1 = 0.31", "pneumatic trail over radius"),
@@ -210,6 +212,57 @@ def test_a_finding_begins_at_its_limit(old, within, beyond, says):
     good = GOOD.replace("QCZ1 = 1.1\n", "") if "\nQCZ1" in within else GOOD
     told = lambda new: [line for line in found(good.replace(old, new, 1)) if line.startswith(says)]
     assert not told(within) and told(beyond)
+
+
+LIMITS = {
+    "LONGVL": (5, 50, "tyres are measured at 5 to 50 m/s"),
+    "ALPMIN": (-3.2, None, "must be in radians"),
+    "ALPMAX": (None, 3.2, "must be in radians"),
+    "CAMMIN": (-3.2, None, "must be in radians"),
+    "CAMMAX": (None, 3.2, "must be in radians"),
+    "KPUMIN": (-5, None, "a slip ratio of 1 is 100 %"),
+    "KPUMAX": (None, 5, "a slip ratio of 1 is 100 %"),
+    "NOMPRES": (2e4, 2e6, "tyres have 20 to 2000 kPa"),
+    "INFLPRES": (2e4, 2e6, "tyres have 20 to 2000 kPa"),
+    "UNLOADED_RADIUS": (0.05, 1.5, "wheels have 0.05 to 1.5 m"),
+    "FNOMIN": (100, 1e5, "wheels carry 100 to 100000 N"),
+    "PCX1": (1, 2, "usual values are 1 to 2"),
+    "PCY1": (1, 2, "usual values are 1 to 2"),
+    "QSY1": (0, 0.05, "usually 0 to 0.05"),
+}
+"""The least and the greatest number without a finding, and what the finding says: the numbers of its text are the limits."""
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize(
+    ("key", "limit", "beyond"),
+    [
+        (key, limit, way * 0.02)
+        for key, limits in LIMITS.items()
+        for limit, way in zip(limits[:2], (-1, 1), strict=True)
+        if limit is not None
+    ],
+)
+def test_a_number_at_its_limit_is_within(key, limit, beyond):
+    with_number = lambda number: re.sub(rf"(?m)^{key} = .*$", f"{key} = {number:.8g}", GOOD)
+    told = lambda number: [line for line in found(with_number(number)) if f"{key} " in line and LIMITS[key][2] in line]
+    assert not told(limit) and told(limit + beyond * max(abs(limit), 0.01))
+
+
+@pytest.mark.parametrize("size", ["C", "D"])
+@pytest.mark.parametrize("axis", ["X", "Y"])
+def test_no_force_is_no_reversed_one(axis, size):
+    """A share of rounding was told as -inf."""
+    shifted = f"P{size}{axis}1 = 0\nPV{axis}1 = 0.3\nRB{axis}3 = -0.2\nRBY4 = 0.48"
+    told = found(re.sub(rf"(?m)^P{size}{axis}1 = .*$", shifted, GOOD))
+    assert told and not [line for line in told if "inf of it" in line]
+
+
+def test_pressures_are_looked_at_from_half_to_twice_that_of_the_file():
+    wide = GOOD.replace("PRESMIN = 150000", "PRESMIN = 20000").replace("PRESMAX = 350000", "PRESMAX = 2000000")
+    looked_at = lambda text: set(property_check._freely(tyres.from_property_file(parse_property_file(text))).pressure)
+    assert looked_at(wide) == {110000.0, 220000.0, 440000.0}
+    assert looked_at(GOOD) == {150000.0, 220000.0, 350000.0}
 
 
 def test_the_nominal_load_is_the_scaled_one():

@@ -121,7 +121,8 @@ class Federated(AbstractWrapper):
         k = len(self.groups)
         shares = self.shares or (1 / k,) * k
         shares = jnp.asarray(shares, prior.vector.dtype)
-        start = FederatedBelief(prior, (prior,) * k, shares, jnp.ones_like(shares))
+        # The first row makes the local beliefs of what is handed out.
+        start = FederatedBelief(prior, (), shares, jnp.ones_like(shares))
         return self._update_locals(model, start, prior, self._hand_out(prior, shares), row)
 
     def _step(self, model, belief, row):
