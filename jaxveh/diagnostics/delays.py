@@ -8,6 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxveh import numerics
+
 LONGEST = 2.0
 """Largest delay that is searched for, s."""
 
@@ -59,7 +61,7 @@ def delay_of_rows(mean, truth, there, most: int):
     before, here, after = far[best - 1], far[best], far[best + 1]
     curve = before - 2.0 * here + after
     bent = curve > 0.0
-    between = jnp.where(bent, 0.5 * (before - after) / jnp.where(bent, curve, 1.0), 0.0)
+    between = jnp.where(bent, 0.5 * (before - after) / numerics.or_one(curve, bent), 0.0)
     found = shifts[best].astype(mean.dtype) + between
     moves = jnp.sqrt(mean_of(truth**2)) > max(LIVELY, 100.0 * float(jnp.finfo(mean.dtype).eps)) * size
     nearest = (here <= before) & (here <= after)

@@ -46,7 +46,7 @@ def speed_heard(values: dict[str, Any], front_share: Any) -> tuple[Any, Any]:
     front, rear = _axle_weights(jnp.asarray(front_share, speeds.dtype))
     weights = jnp.where(there, jnp.stack([front, front, rear, rear]), 0.0)
     total = jnp.sum(weights)
-    wheels = jnp.sum(weights * jnp.where(there, speeds, 0.0)) / jnp.where(total > 0, total, 1.0)
+    wheels = jnp.sum(weights * jnp.where(there, speeds, 0.0)) / numerics.or_one(total, total > 0)
     given = values["v_x"]
     return jnp.where(jnp.isnan(given), wheels, given), ~jnp.isnan(given) | (total > 0)
 

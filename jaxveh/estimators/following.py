@@ -124,7 +124,7 @@ def _solve(covariance: Any, b: Any) -> Any:
     A little is added to the diagonal of the correlations, so that they have a factor; two refinements take its effect out again.
     """
     size = jnp.diagonal(covariance)
-    scale = jnp.where(size > 0.0, 1.0 / numerics.sqrt(jnp.where(size > 0.0, size, 1.0)), 0.0)[:, None]
+    scale = jnp.where(size > 0.0, 1.0 / numerics.sqrt(numerics.or_one(size, size > 0.0)), 0.0)[:, None]
     correlations, b = scale * covariance * scale.T, scale * b
     factor = numerics.cholesky(correlations + LITTLE * jnp.finfo(size.dtype).eps * jnp.eye(len(size), dtype=size.dtype))
     found = numerics.solve_psd(factor, b)

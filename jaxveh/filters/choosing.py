@@ -32,7 +32,7 @@ def score(log_probability):
 def log_of(weights):
     """Log weights with -inf for zero, and zero instead of infinite gradients there; subnormal weights count as zero."""
     alive = weights >= jnp.finfo(weights.dtype).tiny
-    return jnp.where(alive, jnp.log(jnp.where(alive, weights, 1)), -jnp.inf)
+    return jnp.where(alive, jnp.log(numerics.or_one(weights, alive)), -jnp.inf)
 
 
 def gather(particles, ancestors):

@@ -60,7 +60,7 @@ class Transport(AbstractResampling):
         safe = jnp.where(spread_out, weights, jnp.full_like(weights, 1.0 / weights.shape[0]))
         spread = _spread(fields, safe)
         # A field that does not vary adds nothing to the distances.
-        scale = jnp.where(spread > 0, spread, 1.0)
+        scale = numerics.or_one(spread, spread > 0)
         cost = distances(fields / scale)
         plan = transport_plan(cost, log_of(safe), self.epsilon, self.iterations)
         misplaced = 0.5 * jnp.sum(jnp.abs(jnp.mean(plan, axis=0) - weights))

@@ -11,6 +11,8 @@ import jax.scipy.linalg
 import optimistix as optx
 from jax import lax
 
+from jaxveh import numerics
+
 FIRST, LESS, MORE = 1.0, 0.1, 4.0
 """Damping at the start, and its factors after a step that went as predicted and after one that did not.
 
@@ -75,7 +77,7 @@ class LevenbergMarquardt(optx.AbstractMinimiser):
         lowered = at.cost - cost
         # NaN where the step left the law's domain; then the step is refused.
         better = lowered > 0
-        share = jnp.where(jnp.isfinite(lowered), lowered, -1.0) / jnp.where(foretold > 0, foretold, 1.0)
+        share = jnp.where(jnp.isfinite(lowered), lowered, -1.0) / numerics.or_one(foretold, foretold > 0)
         little = (foretold <= self.rtol * at.cost) & (jnp.abs(lowered) <= self.rtol * at.cost)
         done = little | (jnp.max(jnp.abs(move)) <= self.atol)
         damping = state.damping * jnp.where(share > 0.75, LESS, jnp.where(share < 0.25, MORE, 1.0))

@@ -9,6 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import optimistix as optx
 
+from jaxveh import numerics
 from jaxveh.fitting.levenberg_marquardt import Quadratic, termination
 
 FIRST_DAMPING, RAISED, LOWERED, LEAST_RAISED = 1e-2, 5.0, 0.2, 1e-3
@@ -114,7 +115,7 @@ def with_secants(curvature, moves, changes):
     for move, change in zip(moves, changes, strict=True):
         along = curvature @ move
         fits = change @ move > 1e-2 * move @ along
-        raised = jnp.outer(change, change) / jnp.where(fits, change @ move, 1.0)
-        lowered = jnp.outer(along, along) / jnp.where(fits, move @ along, 1.0)
+        raised = jnp.outer(change, change) / numerics.or_one(change @ move, fits)
+        lowered = jnp.outer(along, along) / numerics.or_one(move @ along, fits)
         curvature = jnp.where(fits, curvature + raised - lowered, curvature)
     return curvature

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_at_least, check_finite, check_flags, check_kind, check_whole
 from jaxveh._core.result import Result, code
 from jaxveh.fitting.problem import AbstractProblem, SearchEnd, by_name, in_units
@@ -131,7 +132,7 @@ def fit_at(problem: AbstractProblem, found: SearchEnd, cost, uncertainty: tuple[
     variance = jnp.diagonal(covariance)
     known = known & (variance > 0)
     slopes = jnp.stack([p.domain.slope(value) for p, value in zip(chosen, values, strict=True)])
-    std = jnp.where(known, jnp.abs(slopes) * jnp.sqrt(jnp.where(known, variance, 1.0)), jnp.nan)
+    std = jnp.where(known, jnp.abs(slopes) * jnp.sqrt(numerics.or_one(variance, known)), jnp.nan)
     well = found.converged & ~problem.is_failure(cost)
     finite = jnp.all(jnp.isfinite(found.z)) & jnp.isfinite(cost)
     result = jnp.where(well, code(Result.successful), code(Result.not_converged))

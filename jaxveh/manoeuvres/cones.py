@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxveh import numerics
 from jaxveh._core.errors import (
     InputError,
     check,
@@ -219,7 +220,7 @@ def _margin(corners, lane: Lane):
         margins.append(_within(y, lane, (x >= lane.start) & (x <= lane.end)))
         for limit in (lane.start, lane.end):
             crosses = (x - limit) * (x_next - limit) < 0
-            share = (limit - x) / jnp.where(crosses, x_next - x, 1.0)
+            share = (limit - x) / numerics.or_one(x_next - x, crosses)
             margins.append(_within(y + share * (y_next - y), lane, crosses))
     return jnp.min(jnp.stack(margins), axis=0)
 

@@ -97,7 +97,7 @@ class PathDriver(AbstractDriver):
         distance = numerics.hypot(self.preview_time * motion.v_x, self.shortest_preview)
         target = self.path.preview(motion.x, motion.y, course, distance)
         square = target.ahead * target.ahead + target.left * target.left
-        curvature = 2.0 * target.left / jnp.where(square > 0, square, 1.0)
+        curvature = 2.0 * target.left / numerics.or_one(square, square > 0)
         return curvature, self.wheelbase + self.understeer_gradient * motion.v_x * motion.v_x
 
     def _limit(self, steer: jax.Array) -> jax.Array:

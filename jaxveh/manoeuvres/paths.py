@@ -170,5 +170,5 @@ class Circle(AbstractPath):
         from_centre = y - self.radius
         away = numerics.hypot(x, from_centre)
         # At the centre all points are equally near: one of them is taken.
-        scale = jnp.sign(self.radius) / jnp.where(away > 0, away, 1.0)
+        scale = jnp.sign(self.radius) / numerics.or_one(away, away > 0)
         return x * scale, jnp.where(away > 0, -from_centre * scale, 1.0), away

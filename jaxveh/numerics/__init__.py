@@ -7,6 +7,7 @@ from jaxveh.numerics import polynomials, sigma_points
 from jaxveh.numerics.angles import wrap_angle
 from jaxveh.numerics.blocks import sum_in_blocks
 from jaxveh.numerics.by_batch import RUNS, by_batch
+from jaxveh.numerics.divisors import or_one
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
 from jaxveh.numerics.fences import apart, fence, fence_blocks, fence_results
 from jaxveh.numerics.harmonics import band_harmonics, gauss_markov_harmonics, sum_of_harmonics
@@ -67,6 +68,7 @@ __all__ = [
     "normalise",
     "normals",
     "on_cpu",
+    "or_one",
     "pays_alone",
     "polynomials",
     "residual",

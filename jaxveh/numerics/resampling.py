@@ -20,6 +20,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxveh.numerics import random, sums
+from jaxveh.numerics.divisors import or_one
 from jaxveh.numerics.elementary import log
 from jaxveh.numerics.fences import fence
 from jaxveh.numerics.platform import on_cpu
@@ -99,7 +100,7 @@ def ess(weights: Array) -> Array:
 def _ess(weights: Array) -> Array:
     square = sums.total(weights * weights)
     total = sums.total(weights)
-    return jnp.where(square > 0.0, total * total / jnp.where(square > 0.0, square, 1.0), 0.0)
+    return jnp.where(square > 0.0, total * total / or_one(square, square > 0.0), 0.0)
 
 
 def normalise(log_weights: Array) -> tuple[Array, Array, Array]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
+from jaxveh.numerics.divisors import or_one
+
 
 def interpolate_linear(x: jax.Array, points: jax.Array, values: jax.Array) -> jax.Array:
     """Linear interpolation between `points` (n,), rising, n >= 2, with `values` (n,); constant beyond. The result has the
@@ -44,7 +46,7 @@ def _slopes(points, values):
     before, after = secants[:-1], secants[1:]
     first, second = 2.0 * steps[1:] + steps[:-1], steps[1:] + 2.0 * steps[:-1]
     same = before * after > 0
-    weighted = first / jnp.where(same, before, 1.0) + second / jnp.where(same, after, 1.0)
-    inner = jnp.where(same, (first + second) / jnp.where(same, weighted, 1.0), 0.0)
+    weighted = first / or_one(before, same) + second / or_one(after, same)
+    inner = jnp.where(same, (first + second) / or_one(weighted, same), 0.0)
     zero = jnp.zeros((1,), values.dtype)
     return jnp.concatenate((zero, inner, zero))

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from jaxveh.numerics.divisors import or_one
 from jaxveh.numerics.fences import fence
 from jaxveh.numerics.linear_algebra import solve_lower
 
@@ -48,8 +49,8 @@ def _orthogonalise(matrix: Array) -> tuple[Array, Array]:
     for i in range(n):
         squared = jnp.sum(rest[0] * rest[0])
         some = squared > 0
-        length = jnp.where(some, jnp.sqrt(jnp.where(some, squared, 1)), 0)
-        direction = rest[0] * jnp.where(some, 1 / jnp.where(some, length, 1), 0)
+        length = jnp.where(some, jnp.sqrt(or_one(squared, some)), 0)
+        direction = rest[0] * jnp.where(some, 1 / or_one(length, some), 0)
         along = jnp.sum(rest[1:] * direction, axis=-1)
         columns.append(jnp.concatenate([jnp.zeros(i, matrix.dtype), length[None], along]))
         directions.append(direction)

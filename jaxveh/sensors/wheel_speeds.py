@@ -136,7 +136,7 @@ class WheelSpeeds(AbstractInstrument):
         if key is not None:
             way = self._by_wheel(numerics.uniform, subkey(key, _START_TAG), teeth[0])
         turns = teeth > 0
-        since = jnp.where(turns, jnp.minimum(way * self.period / jnp.where(turns, teeth, 1.0), _LONG), _LONG)
+        since = jnp.where(turns, jnp.minimum(way * self.period / numerics.or_one(teeth, turns), _LONG), _LONG)
         return _Ring(way, since, self.pitch / self.period * teeth, jnp.zeros_like(teeth))
 
     def _by_wheel(self, draw: Callable, key: Any, like: jax.Array) -> jax.Array:
@@ -152,12 +152,12 @@ class WheelSpeeds(AbstractInstrument):
         way = gone - edges
         new = edges > 0
         waited = ring.since + self.period
-        passed = jnp.minimum((way - ring.error) / jnp.where(new, teeth, 1.0), 1.0) * self.period
+        passed = jnp.minimum((way - ring.error) / numerics.or_one(teeth, new), 1.0) * self.period
         since = jnp.where(new, passed, waited)
         # By their errors two edges may be in the wrong order if a wheel passes little more than one edge in a period.
         between = jnp.maximum(waited - since, 1e-3 * self.period)
         slower = jnp.minimum(ring.held, self.pitch / waited)
-        timed = jnp.where(new, self.pitch * edges / jnp.where(new, between, 1.0), slower)
+        timed = jnp.where(new, self.pitch * edges / numerics.or_one(between, new), slower)
         said = timed if self.method == "M/T" else self.pitch / self.period * edges
         return _Ring(way, since, timed, jnp.where(new, error, ring.error)), said
 

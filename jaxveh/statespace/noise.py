@@ -248,7 +248,7 @@ class StudentT(AbstractNoise):
         check("degrees of freedom", self.dof, lambda dof: dof > 2, "above 2 for a covariance to exist",
               "Use a particle filter, or more degrees of freedom.")  # fmt: skip
         # Under jit the check is skipped: NaN then shows an error that a negative variance would hide.
-        factor = jnp.where(self.dof > 2, self.dof / jnp.where(self.dof > 2, self.dof - 2, 1), jnp.nan)
+        factor = jnp.where(self.dof > 2, self.dof / numerics.or_one(self.dof - 2, self.dof > 2), jnp.nan)
         return jnp.diag(jnp.stack([scale**2 * factor for scale in self.scale]))
 
     def times(self, factor):

@@ -52,19 +52,19 @@ class Brush(AbstractTwoStiffnesses):
         sigma_x, sigma_y = theoretical(contact)
         wish_x, wish_y, wish = self.unbounded_force(sigma_x, sigma_y)
         held = limit > 0
-        g = wish / jnp.where(held, 3 * limit, 1.0)
+        g = wish / numerics.or_one(3 * limit, held)
         sticks = (g < 1) & held
         g = jnp.where(sticks, g, 1.0)
         if self.slides == "against velocity":
             return self._against_velocity(contact, limit, g, sigma_x, sigma_y)
-        share = jnp.where(sticks, 1 - g + g**2 / 3, limit / jnp.where(wish > 0, wish, 1.0))
+        share = jnp.where(sticks, 1 - g + g**2 / 3, limit / numerics.or_one(wish, wish > 0))
         F_x, F_y = share * wish_x, share * wish_y
         trail = self.half_length / 3 * (1 - g) ** 3 / (1 - g + g**2 / 3)
         return Forces(F_x=F_x, F_y=F_y, M_z=-contact.direction * trail * F_y)
 
     def _against_velocity(self, contact: Contact, limit, g, sigma_x, sigma_y) -> Forces:
         slides = numerics.hypot(sigma_x, sigma_y)
-        per_slip = limit * g**2 / jnp.where(slides > 0, slides, 1.0)
+        per_slip = limit * g**2 / numerics.or_one(slides, slides > 0)
         rest = 1 - g
         F_x, F_y = (
             (rest**2 * stiffness + per_slip * (3 - 2 * g)) * sigma

@@ -39,7 +39,7 @@ class Dugoff(AbstractTwoStiffnesses):
             limit = limit * self._friction_share(contact, sigma_y)
         wish_x, wish_y, wish = self.unbounded_force(sigma_x, sigma_y)
         slips = 2 * wish > limit
-        part = jnp.where(slips, limit / jnp.where(slips, 2 * wish, 1.0), 1.0)
+        part = jnp.where(slips, limit / numerics.or_one(2 * wish, slips), 1.0)
         share = part * (2 - part)
         return Forces(F_x=share * wish_x, F_y=share * wish_y)
 

@@ -34,10 +34,10 @@ class Fiala(AbstractTwoStiffnesses):
         limit = self.limit(contact)
         F_x = jnp.clip(self.slip_stiffness * contact.slip_ratio, -limit, limit)
         held = limit > 0
-        share = F_x / jnp.where(held, limit, 1.0)
+        share = F_x / numerics.or_one(limit, held)
         left = limit * numerics.sqrt(jnp.maximum(1 - share**2, LEAST_SHARE))
         wish = self.cornering_stiffness * numerics.tan(contact.slip_angle * jnp.ones_like(left))
-        q = jnp.abs(wish) / jnp.where(held, left, 1.0)
+        q = jnp.abs(wish) / numerics.or_one(left, held)
         sticks = (q < 3) & held
         q = jnp.where(sticks, q, 3.0)
         F_y = jnp.where(sticks, wish * (1 - q / 3 + q**2 / 27), jnp.sign(wish) * left)

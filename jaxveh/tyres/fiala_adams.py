@@ -43,7 +43,7 @@ class FialaADAMS(AbstractTwoStiffnesses):
 
         wish = self.cornering_stiffness * tangent
         held = limit > 0
-        q = jnp.abs(wish) / jnp.where(held, 3 * limit, 1.0)
+        q = jnp.abs(wish) / numerics.or_one(3 * limit, held)
         sticks = (q < 1) & held
         H = jnp.where(sticks, 1 - q, 0.0)
         # mu F_z (1 - H^3) and mu F_z (1 - H), where `wish` is 3 mu F_z (1 - H).
@@ -60,5 +60,5 @@ class FialaADAMS(AbstractTwoStiffnesses):
     def _longitudinal(self, kappa, limit):
         wish = self.slip_stiffness * kappa
         slips = 2 * jnp.abs(wish) > limit
-        part = jnp.where(slips, limit / jnp.where(slips, 2 * jnp.abs(wish), 1.0), 1.0)
+        part = jnp.where(slips, limit / numerics.or_one(2 * jnp.abs(wish), slips), 1.0)
         return wish * part * (2 - part)

@@ -78,7 +78,7 @@ class FialaPolynomial(AbstractTwoStiffnesses):
 def _clip_theta(wish, limit, branch: float):
     """|theta|, at most `branch`, and whether it lies below that."""
     held = limit > 0
-    q = jnp.abs(wish) / jnp.where(held, limit, 1.0)
+    q = jnp.abs(wish) / numerics.or_one(limit, held)
     below = (q < branch) & held
     return jnp.where(below, q, branch), below
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh.tyres.base import Contact, Forces
 from jaxveh.tyres.slip import theoretical
 from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
@@ -31,6 +32,6 @@ class HSRI(AbstractTwoStiffnesses):
         sigma_x, sigma_y = theoretical(contact)
         wish_x, wish_y, wish = self.unbounded_force(sigma_x, sigma_y)
         slips = 2 * wish > limit
-        inverse_H = limit / jnp.where(slips, wish, 1.0)
+        inverse_H = limit / numerics.or_one(wish, slips)
         share = jnp.where(slips, inverse_H - inverse_H**2 / 4, 1.0)
         return Forces(F_x=share * wish_x, F_y=share * wish_y)

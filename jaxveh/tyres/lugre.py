@@ -115,7 +115,7 @@ class LuGre(AbstractDynamicTyre):
     def _friction(self, speed):
         """The friction at a sliding speed (Stribeck)."""
         slides = speed > 0
-        power = jnp.where(slides, (jnp.where(slides, speed, 1.0) / self.stribeck_speed) ** self.exponent, 0.0)
+        power = jnp.where(slides, (numerics.or_one(speed, slides) / self.stribeck_speed) ** self.exponent, 0.0)
         return self.kinetic_friction + (self.static_friction - self.kinetic_friction) * jnp.exp(-power)
 
 
@@ -126,21 +126,21 @@ def _travels(contact: Contact):
     if contact.slip_speed is None:
         return forwards
     moves = contact.slip_speed > 0
-    share = need_speed(contact, "LuGre") / jnp.where(moves, contact.slip_speed, 1.0)
+    share = need_speed(contact, "LuGre") / numerics.or_one(contact.slip_speed, moves)
     return forwards * jnp.where(moves, share, 1.0)
 
 
 def _settled_deflection(slip, fading):
     """The steady deflection; zero where nothing moves."""
     moves = fading > 0
-    return slip / jnp.where(moves, fading, 1.0)
+    return slip / numerics.or_one(fading, moves)
 
 
 def _inflow(p):
     """`L kappa`, from 2 at p = 0 down to 1: undeflected bristles replace the deflected ones that leave the contact."""
     large = p >= 1
-    q = jnp.where(large, p, 2.0)
+    q = numerics.or_one(p, large)
     gone = -jnp.expm1(-q)
-    small = jnp.where(large, 1.0, p)
+    small = numerics.or_one(p, ~large)
     series = 2 * polynomials.evaluate(_ABOVE, small) / polynomials.evaluate(_BELOW, small)
     return jnp.where(large, gone / (1 - gone / q), series)

@@ -45,7 +45,7 @@ class Parabolic(AbstractTyre):
 def _parabola(wish, limit):
     """The force of the linear force `wish` (`C slip`) under a limit, and the slip over the slip of the peak, at most 1."""
     held = limit > 0
-    q = jnp.abs(wish) / jnp.where(held, 2 * limit, 1.0)
+    q = jnp.abs(wish) / numerics.or_one(2 * limit, held)
     sticks = (q < 1) & held
     q = jnp.where(sticks, q, 1.0)
     return jnp.where(sticks, wish * (1 - q / 2), jnp.sign(wish) * limit), q

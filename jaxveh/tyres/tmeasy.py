@@ -154,7 +154,7 @@ def _combined_forces(x: _Numbers, y: _Numbers, slip_x, slip_y, after_peak):
     n_x, n_y = slip_x / norm_x, slip_y / norm_y
     slip = numerics.hypot(n_x, n_y)
     moves = slip > NO_SLIP
-    slip = jnp.where(moves, slip, 1.0)
+    slip = numerics.or_one(slip, moves)
     cosine, sine = jnp.where(moves, n_x / slip, 1.0), jnp.where(moves, n_y / slip, 0.0)
 
     between = lambda along, across: numerics.hypot(along * cosine, across * sine)
@@ -192,7 +192,7 @@ def _parabolas(curve: _Numbers, slip):
     bend = F_max**2 / (stiffness * s_max**3)
     meet = s_max + (F_max - F_slide) / (bend * (s_slide - s_max))
     fits = meet < s_slide
-    left = jnp.where(fits, s_slide - meet, 1.0)
+    left = numerics.or_one(s_slide - meet, fits)
     first = F_max - bend * (slip - s_max) ** 2
     second = F_slide + bend * (meet - s_max) / left * (s_slide - slip) ** 2
     return jnp.where(fits, jnp.where(slip < meet, first, second), _cubic(curve, slip))

@@ -7,6 +7,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.parameter import parameter
 from jaxveh.tyres.base import Contact, Forces
 from jaxveh.tyres.slip import theoretical
@@ -37,12 +38,12 @@ class UniTire(AbstractTwoStiffnesses):
         sigma_x, sigma_y = theoretical(contact)
         wish_x, wish_y, wish = self.unbounded_force(sigma_x, sigma_y)
         held = limit > 0
-        phi = wish / jnp.where(held, limit, 1.0)
+        phi = wish / numerics.or_one(limit, held)
         rises = (phi < SATURATED) & held
         phi = jnp.where(rises, phi, SATURATED)
         exponent = 1 + self.E * phi + (self.E**2 + 1 / 12) * phi**2
         slides = phi > 0
-        force = -jnp.expm1(-phi * exponent) / jnp.where(slides, phi, 1.0)
+        force = -jnp.expm1(-phi * exponent) / numerics.or_one(phi, slides)
         share = jnp.where(slides, force, 1.0)
-        share = jnp.where(rises, share, limit / jnp.where(wish > 0, wish, 1.0))
+        share = jnp.where(rises, share, limit / numerics.or_one(wish, wish > 0))
         return Forces(F_x=share * wish_x, F_y=share * wish_y)

@@ -63,7 +63,7 @@ class LateralSystem(NamedTuple):
     def damping_ratio(self) -> Any:
         """The damping ratio -tr / (2 sqrt(det)), 1 or more without oscillation; nan if the car is unstable (det <= 0)."""
         held = self.determinant > 0
-        return jnp.where(held, -0.5 * self.trace / numerics.sqrt(jnp.where(held, self.determinant, 1.0)), jnp.nan)
+        return jnp.where(held, -0.5 * self.trace / numerics.sqrt(numerics.or_one(self.determinant, held)), jnp.nan)
 
     def frequency_response(self, omega: Any) -> LateralResponse:
         """The transfer functions over the steer at s = i `omega` (rad/s):

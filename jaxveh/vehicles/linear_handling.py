@@ -198,4 +198,4 @@ class LinearSingleTrack(AbstractOneTrack):
 def _speed(wheelbase, gradient):
     """sqrt(L / K) if K is positive, otherwise infinite."""
     held = gradient > 0
-    return jnp.where(held, numerics.sqrt(wheelbase / jnp.where(held, gradient, 1.0)), jnp.inf)
+    return jnp.where(held, numerics.sqrt(wheelbase / numerics.or_one(gradient, held)), jnp.inf)

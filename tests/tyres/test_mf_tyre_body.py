@@ -1,13 +1,14 @@
 """The body of MF-Tyre beside its equations in NumPy: radii, deflection, patch, carcass; and what a table's columns mean."""
 
 import dataclasses
+import itertools
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxveh import InputError, tyres
-from jaxveh.tyres import Contact
+from jaxveh.tyres import Contact, evaluation
 from jaxveh.tyres.evaluation import evaluate
 from jaxveh.tyres.mf_tyre import Structure
 from jaxveh.tyres.mf_tyre.structure import Wheel
@@ -154,6 +155,16 @@ def test_a_table_s_empty_columns_are_the_nominal_speed_and_pressure():
     # Half the patch twice, and no load below none.
     out = tyre.outputs(Contact(slip_angle=jnp.asarray(0.03), load=jnp.asarray(4000.0)))
     np.testing.assert_allclose((plain["two_a"][0], plain["two_b"][0]), (2 * out.a, 2 * out.b), rtol=1e-12)
+
+
+def test_every_mode_s_digits_are_the_tyre_s_settings():
+    """And a table without modes is evaluated with the tyre's own."""
+    for limits, angles, spins in itertools.product((True, False), repeat=3):
+        tyre = dataclasses.replace(tyres.typical_mf_tyre(4000.0), limits=limits, angles=angles, spins=spins)
+        mode = (1 if limits else 2) * 100 + (2 if angles else 1) * 10 + (2 if spins else 1)
+        assert evaluation._mode(tyre) == mode
+        found = evaluation._in_mode(tyres.typical_mf_tyre(4000.0), mode)
+        assert (found.limits, found.angles, found.spins) == (limits, angles, spins)
 
 
 @pytest.mark.parametrize(

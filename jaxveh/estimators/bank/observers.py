@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.body_motion import CRAWL, LATERAL, SILENCE, AbstractMotionMethod, arcsin_of
 from jaxveh.estimators.lateral import Lateral, lateral_of, motion_of
@@ -102,7 +103,7 @@ class UnknownInput(AbstractMotionMethod):
         fade = jnp.exp(-w * dt)
         error = self.car.rear_speed(v_x, turn, f_y) - ahead
         v_y = ahead + (1.0 - fade * fade) * error
-        push = memory.push - jnp.where(dt > 0, jnp.square(1.0 - fade) / jnp.where(dt > 0, dt, 1.0), 0.0) * error
+        push = memory.push - jnp.where(dt > 0, jnp.square(1.0 - fade) / numerics.or_one(dt, dt > 0), 0.0) * error
         push = jnp.clip(push, -0.5 * GRAVITY, 0.5 * GRAVITY)
         there = heard["silence"] < SILENCE
         age = jnp.where(there, memory.age + dt, 0.0)

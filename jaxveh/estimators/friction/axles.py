@@ -9,6 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction import brush_curve
@@ -93,7 +94,7 @@ class Axles(eqx.Module):
         foretold = forces[0] - self.residual(forces, difference, log_friction, stiffer)
         least = jnp.minimum(jnp.abs(forces[0]), jnp.abs(foretold))
         enough = linear > LEAST_FORCE * car.front.peak
-        return jnp.where(enough, 1.0 - least / jnp.where(enough, linear, 1.0), 0.0)
+        return jnp.where(enough, 1.0 - least / numerics.or_one(linear, enough), 0.0)
 
 
 class LateralCurve(AbstractMethod):

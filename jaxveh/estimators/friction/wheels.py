@@ -217,7 +217,7 @@ class Reconstruction(AbstractWheelMethod):
         slip, used = memory.slip + share * (slip_now - memory.slip), memory.used + share * (used_now - memory.used)
         faster, harder = (slip_now - slip) / self.lag, (used_now - used) / self.lag
         moves = here & (jnp.abs(faster) > self.least_rate)
-        raw = harder / jnp.where(moves, faster, 1.0)
+        raw = harder / numerics.or_one(faster, moves)
         steepest = self._steepest()
         slope = jnp.where(moves, memory.slope + share * (jnp.clip(raw, 0.0, steepest) - memory.slope), memory.slope)
         age = jnp.where(moves, 0.0, memory.age + dt)

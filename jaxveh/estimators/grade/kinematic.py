@@ -96,7 +96,7 @@ class Satellite(AbstractMotionMethod):
         late = memory.late + dt / (self.delay + dt) * (heard["a_x"] - memory.late)
         # Both have the same filter at the satellites' rate, with the mean acceleration between two fixes.
         gathered = memory.gathered + dt * late
-        mean = gathered / jnp.where(since > 0, since, 1.0)
+        mean = gathered / numerics.or_one(since, since > 0)
         felt = jnp.where(spoke, memory.felt + share * (mean - memory.felt), memory.felt)
         gathered = jnp.where(spoke, 0.0, gathered)
         since = jnp.where(spoke, 0.0, since)
@@ -141,7 +141,7 @@ class Climb(AbstractMethod):
         rise, speed = low(memory.rise, values["climb_rate"]), low(memory.speed, values["speed"])
         silent = jnp.where(spoke, 0.0, since)
         known = (silent < 2.0 * SILENCE) & (speed > self.slowest)
-        grade = jnp.where(speed > 0.0, numerics.arctan(rise / jnp.where(speed > 0.0, speed, 1.0)), 0.0)
+        grade = jnp.where(speed > 0.0, numerics.arctan(rise / numerics.or_one(speed, speed > 0.0)), 0.0)
         return ClimbMemory(t, silent, rise, speed), answer({"grade": grade}, known=known)
 
 

@@ -53,7 +53,7 @@ class SteadySteer(AbstractSteadyState):
         stiff = self.wheelbase**2 * self.front_cornering_stiffness * self.rear_cornering_stiffness
         steadiness = 1.0 - self.mass * jnp.square(v_x) * leverage / stiff
         steady = steadiness >= LEAST_STEADINESS
-        return (steer + self.steer_offset) / jnp.where(steady, steadiness, 1.0), steady
+        return (steer + self.steer_offset) / numerics.or_one(steadiness, steady), steady
 
     def asked_acceleration(self, v_x, steer):
         """The lateral acceleration of that turn, m/s^2."""

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.speed.wheels import AbstractWheelMethod
 
@@ -69,7 +70,7 @@ class AdaptiveNonlinear(AbstractWheelMethod):
         slope = jnp.where(learns, own.slope + mixed * (-rate - own.slope), own.slope)
         over = own.up & (rate < -self.turn) & wheels.spoke
         waited = wheels.t - own.peak_at
-        between = (own.peak - own.highest) / jnp.where(waited > 0.0, waited, 1.0)
+        between = (own.peak - own.highest) / numerics.or_one(waited, waited > 0.0)
         slope = jnp.where(over & ~learns & (waited > 0.05), slope + self.renewal * (between - slope), slope)
         v_x = jnp.where(over & ~follows, v_x + self.renewal * (own.highest - v_x), v_x)
         up = jnp.where(over, False, own.up | (rate > self.turn))

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.method import AbstractMethod, Answer, answer
 from jaxveh.estimators.stiffness.single_track import LEAN, Followed, LinearCar, Signals
@@ -175,7 +176,7 @@ class Derivatives(AbstractLeastSquares):
         masses = car.mass / car.wheelbase * jnp.stack([car.rear_axle_to_cg, car.front_axle_to_cg])
         file = jnp.stack([car.front_cornering_stiffness, car.rear_cornering_stiffness])
         told = memory.square > self.enough * jnp.square(self.epsilon)
-        found = masses * memory.product / jnp.where(told, memory.square, 1.0)
+        found = masses * memory.product / numerics.or_one(memory.square, told)
         stiffness = jnp.where(told, jnp.clip(found, 0.2 * file, 5.0 * file), file)
         names = ("front_cornering_stiffness", "rear_cornering_stiffness")
         mean = {name: stiffness[k] for k, name in enumerate(names)}

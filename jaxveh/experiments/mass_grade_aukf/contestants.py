@@ -8,7 +8,7 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxveh import filters
+from jaxveh import filters, numerics
 from jaxveh._core.bijectors import Real
 from jaxveh._core.names import record_type
 from jaxveh.estimators import mass_and_grade
@@ -149,7 +149,7 @@ class Frozen(filters_kit.AbstractStateless):
     def update(self, model, belief, row):
         after, info = self.inner.update(model, belief, row)
         before, now = belief.memory[0], after.memory[0]
-        shrink = jnp.where(before > 0, now / jnp.where(before > 0, before, 1.0), 1.0)
+        shrink = jnp.where(before > 0, now / numerics.or_one(before, before > 0), 1.0)
         place = model.states.index("mass")
         P = after.inside.covariance
         scales = jnp.ones_like(P).at[place, :].set(shrink).at[:, place].set(shrink)

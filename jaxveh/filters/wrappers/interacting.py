@@ -129,7 +129,7 @@ class InteractingModels(AbstractWrapper):
         ahead = jnp.sum(joint, axis=0)
         # A mode of probability zero is not mixed: it continues from its own Gaussian, with zero weight.
         alone = jnp.eye(len(self.variants), dtype=joint.dtype)
-        from_each = jnp.where(ahead > 0, joint / jnp.where(ahead > 0, ahead, 1), alone)
+        from_each = jnp.where(ahead > 0, joint / numerics.or_one(ahead, ahead > 0), alone)
         found = []
         for j, mode in enumerate(self._modes(model)):
             mixed = self._mix(belief, from_each[:, j], j)

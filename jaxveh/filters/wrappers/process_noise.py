@@ -57,7 +57,7 @@ class ShrinkingProcess(AbstractRemembering):
         after, info = self.update_inside(model, belief, row)
         d, q = _squared_changes(belief.inside, after.inside, self.extra), belief.memory
         # The extra noise may have shrunk to zero.
-        total = jnp.where(q + d > 0, q + d, 1.0)
+        total = numerics.or_one(q + d, q + d > 0)
         return Remembering(after.inside, q * jnp.abs(q - 0.5 * (d + q)) / total), info
 
 

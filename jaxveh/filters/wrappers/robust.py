@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.errors import check_positive, check_whole
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, measurements_of, wrapped_innovation
 from jaxveh.filters.gaussian.rules import spread_of
@@ -55,7 +56,7 @@ class Huber(AbstractReweighting):
         found = innovation(self.inner, model, belief, row)
         squared = jnp.square(found.error) / (found.expected + found.noise)
         large = squared > self.threshold**2
-        weight = jnp.where(large, self.threshold / jnp.sqrt(jnp.where(large, squared, 1)), 1)
+        weight = jnp.where(large, self.threshold / jnp.sqrt(numerics.or_one(squared, large)), 1)
         return self.inner.update(with_variances(model, variances_of(model) / weight), belief, row)
 
 

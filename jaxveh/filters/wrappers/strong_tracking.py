@@ -7,6 +7,7 @@ from typing import ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.errors import check
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.filters.wrappers.base import AbstractRemembering, Remembering
@@ -53,7 +54,7 @@ class StrongTracking(AbstractRemembering):
         excess = jnp.where(found.here, squares - self.softening, 0.0)
         expected = jnp.sum(jnp.where(found.here, found.expected / found.noise, 0.0))
         some = expected > 0
-        factor = jnp.where(some, jnp.sum(excess) / jnp.where(some, expected, 1.0), 1.0)
+        factor = jnp.where(some, jnp.sum(excess) / numerics.or_one(expected, some), 1.0)
         factor = jnp.clip(factor, 1.0, self.ceiling)
         after, info = self.inner.update(model, belief.inside.inflate(factor), row)
         return Remembering(after, squares), info

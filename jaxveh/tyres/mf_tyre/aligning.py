@@ -120,8 +120,8 @@ def _slip_share(at, K_xk, K_ya):
 
 def _per_friction(scale, mu):
     """`scale / mu`, or 0 without friction, where there is no force for which it matters."""
-    slippery = mu == 0
-    return jnp.where(slippery, 0.0, scale / jnp.where(slippery, 1.0, mu))
+    grips = mu != 0
+    return jnp.where(grips, scale / numerics.or_one(mu, grips), 0.0)
 
 
 def _equivalent(alpha, slip):

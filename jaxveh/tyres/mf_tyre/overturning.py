@@ -32,7 +32,7 @@ class OverturningCoefficients(AbstractSection):
     def moment(self, at, scaling, structure, least_load, F_y):
         """M_x, N m; below `least_load` (N) the load in it is replaced by load^3 / least_load^2."""
         c, camber = self, at.camber
-        load = jnp.where(at.load < least_load, at.load**3 / jnp.where(least_load > 0, least_load, 1) ** 2, at.load)
+        load = jnp.where(at.load < least_load, at.load**3 / numerics.or_one(least_load, least_load > 0) ** 2, at.load)
         share, side = load / structure.FNOMIN, F_y / structure.FNOMIN
         level = numerics.cos(c.QSX5 * numerics.arctan((c.QSX6 * share) ** 2))
         lean = numerics.sin(c.QSX7 * camber + c.QSX8 * numerics.arctan(c.QSX9 * side))

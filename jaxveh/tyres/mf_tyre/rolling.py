@@ -32,7 +32,7 @@ class RollingCoefficients(AbstractSection):
         """M_y, N m, negative when rolling forward; `load` and `slip_ratio` are those of the contact, without limits."""
         c = self
         least = ranges.FZMIN
-        load = jnp.where(load < least, load**2 / jnp.where(least > 0, least, 1), load)
+        load = jnp.where(load < least, load**2 / numerics.or_one(least, least > 0), load)
         share, speed = load / structure.FNOMIN, at.speed / structure.LONGVL
         sum_ = c.QSY1 + c.QSY2 * F_x / structure.FNOMIN + c.QSY3 * jnp.abs(speed) + c.QSY4 * speed**4
         if version == 52:
@@ -51,7 +51,7 @@ class RollingCoefficients(AbstractSection):
         about the locked wheel.
         """
         moves = at.speed > 0
-        high = ranges.VXLOW / jnp.where(moves, at.speed, 1) - 1
+        high = ranges.VXLOW / numerics.or_one(at.speed, moves) - 1
         low = -1 - ranges.VXLOW - high
         between = numerics.sin((math.pi / 2) * (slip_ratio + 1) / jnp.where(high + 1 == 0, 1, high + 1))
         turns = jnp.where(slip_ratio > high, 1.0, jnp.where(slip_ratio < low, -1.0, between))
@@ -63,4 +63,4 @@ def _power(base, exponent):
     """`base^exponent`; if the base is zero, the result and its derivatives are zero."""
     some = base > 0
     # On the CPU the power of XLA takes ten times as long as an exponential and a logarithm.
-    return jnp.where(some, jnp.exp(exponent * numerics.log(jnp.where(some, base, 1.0))), 0.0)
+    return jnp.where(some, jnp.exp(exponent * numerics.log(numerics.or_one(base, some))), 0.0)

@@ -129,7 +129,7 @@ class Structure(AbstractSection):
         tread = (1.075 - 0.5 * s.ASPECT_RATIO) * s.WIDTH
         grown = s.Q_CAM1 * free + s.Q_CAM2 * free**2
         leans = (grown != 0) & (camber != 0)
-        ratio = (s.Q_CAM1 * radius + s.Q_CAM2 * radius**2) / jnp.where(leans, grown, 1.0)
+        ratio = (s.Q_CAM1 * radius + s.Q_CAM2 * radius**2) / numerics.or_one(grown, leans)
         by_camber = ratio**2 * tread / 8 * jnp.abs(numerics.tan(camber)) - s.Q_CAM3 * sinks * jnp.abs(camber)
         rho = jnp.maximum(sinks + jnp.where(leans, by_camber, 0.0), 1e-12)
         x = rho / s.UNLOADED_RADIUS
@@ -156,7 +156,7 @@ class Structure(AbstractSection):
         share = load / (stiffness * self.UNLOADED_RADIUS)
         a = self.UNLOADED_RADIUS * (self.Q_RA2 * share + self.Q_RA1 * numerics.sqrt(share))
         some = share > 0
-        third = jnp.where(some, jnp.cbrt(jnp.where(some, share, 1.0)), 0.0)
+        third = jnp.where(some, jnp.cbrt(numerics.or_one(share, some)), 0.0)
         return a, self.WIDTH * (self.Q_RB2 * share + self.Q_RB1 * third)
 
     def carcass(self, df_z, dp_i):

@@ -116,7 +116,7 @@ class Spin(NamedTuple):
         D_rp = D * numerics.sin(c.QDRP1 * numerics.arctan(turned))
         at_90 = most * (2 / math.pi) * numerics.arctan(c.QCRP2 * jnp.abs(self.path)) * weight
         turning = jnp.abs(D_rp) > 1e-9 * (1 + most)
-        share = jnp.where(turning, at_90 / jnp.where(turning, jnp.abs(D_rp), 1.0), 0.0)
+        share = jnp.where(turning, at_90 / numerics.or_one(jnp.abs(D_rp), turning), 0.0)
         inside = share < 1 - 1e-9
         angle = jnp.where(inside, jnp.arccos(jnp.where(inside, share, 0.0)), 0.0)
         return D_rp, jnp.where(turning, (2 / math.pi) * angle, 1.0)

@@ -196,7 +196,7 @@ class MFTyre(AbstractTyre):
             carries = at.moment_load
         a, b = structure.contact_patch(load, at.dp_i, self.version)
         C_x, C_y = structure.carcass(at.df_z, at.dp_i)
-        C_z = carries / jnp.where(rho > 0, rho, 1.0)
+        C_z = carries / numerics.or_one(rho, rho > 0)
         if self.version != 52:
             sigma = jnp.abs(along.stiffness / C_x), jnp.abs(across.stiffness / C_y)
         else:
@@ -212,6 +212,6 @@ class MFTyre(AbstractTyre):
         sigma_x = sigma_x * R_0 * at.load / self.structure.FNOMIN
         greatest = y.PTY2 * nominal
         squares = at.load**2 + greatest**2
-        sine = 2 * at.load * greatest / jnp.where(squares > 0, squares, 1.0)
+        sine = 2 * at.load * greatest / numerics.or_one(squares, squares > 0)
         sigma_y = y.PTY1 * sine * (1 - y.PKY3 * jnp.abs(at.camber)) * R_0 * s.LFZO * s.LSGAL
         return sigma_x, sigma_y

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh import estimators, sweeps
+from jaxveh import estimators, numerics, sweeps
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh._core.recording import Recording
@@ -221,7 +221,7 @@ def metrics(mean, std, known, truth, held) -> dict[str, Any]:
         "rmse": rms(warm & finite), "early": rms(warm & finite & (rows < half)), "late": rms(finite & (rows >= half)),
         "rmse_known": rms(sure), "worst": jnp.max(jnp.where(warm & finite, jnp.abs(error), 0.0)),
         "known": count(warm & known) / count(warm),
-        "nees": rms(claimed, error / jnp.where(claimed, std, 1.0)) ** 2,
+        "nees": rms(claimed, error / numerics.or_one(std, claimed)) ** 2,
         "delay": STEP * late, "failed": 1.0 - jnp.all(finite | ~warm).astype(error.dtype),
     }  # fmt: skip
 
