@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_smoothers_of_one_state import KEY, MODEL, TIME, R
 
-from jaxveh import Recording, filters
+from jaxveh import Recording
 from jaxveh.filters import kit
 
 MOVES = np.array([-1.0, -0.4, 0.1, 0.7, 1.6])
