@@ -43,6 +43,17 @@ class Checked:
                 setattr(cls, name, _with_check(made, name, checks[name]))
 
 
+def check_unchanged(cls: type, base: type, why: str) -> None:
+    """Raise `TypeError` if a class changes what a concrete class of the family `base` defines; `why` it would not count."""
+    for owner in cls.__mro__[1:]:
+        if owner is base or not issubclass(owner, base) or inspect.isabstract(owner):
+            continue
+        for name in vars(cls):
+            if not name.startswith("_") and hasattr(owner, name):
+                told = f"{cls.__name__}.{name}: cannot replace that of {owner.__name__}: {why}"
+                raise TypeError(f"{told} Derive from {base.__name__}.")
+
+
 def _with_check(method: Any, name: str, check: Check) -> Callable:
     @functools.wraps(method)
     def checked(self, *given, **options):

@@ -13,6 +13,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.bijectors import Interval, Positive
+from jaxveh._core.contracts import check_unchanged
 from jaxveh._core.errors import InputError, check, check_positive, float_array, is_concrete
 from jaxveh._core.names import as_mapping, record
 from jaxveh._core.parameter import parameter, positive
@@ -27,7 +28,13 @@ class AbstractNoise(eqx.Module):
     A batch is a mapping from each name to an array of any common shape.
 
     Further properties are declared where they hold; the default is *no*: `is_gaussian`, `adds_up`.
+
+    **Raises** `TypeError` for a class that replaces a method of a law of this package, which filters read by its numbers.
     """
+
+    def __init_subclass__(cls, **given):
+        super().__init_subclass__(**given)
+        check_unchanged(cls, AbstractNoise, "filters read a law of this package by its numbers alone.")
 
     @property
     def is_gaussian(self) -> bool:

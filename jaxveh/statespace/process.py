@@ -70,13 +70,16 @@ class Together(AbstractProcessNoise):
 
 
 def join(a: AbstractProcessNoise | None, b: AbstractProcessNoise | None) -> AbstractProcessNoise | None:
-    """Two process noises over disjoint fields as one; those in continuous time, and those per step, become one law each."""
+    """Two process noises over disjoint fields as one; those in continuous time, and those per step, become one law each.
+
+    One of a derived class stays beside them: what it changes would be lost.
+    """
     if a is None or b is None:
         return a if b is None else b
     flat = [part for noise in (a, b) for part in (noise.parts if isinstance(noise, Together) else (noise,))]
-    parts = [part for part in flat if not isinstance(part, Continuous | Discrete)]
+    parts = [part for part in flat if type(part) not in (Continuous, Discrete)]
     for kind in (Discrete, Continuous):
-        law = combine(*[part.law for part in flat if isinstance(part, kind)])
+        law = combine(*[part.law for part in flat if type(part) is kind])
         if law is not None:
             parts.insert(0, kind(law))
     return parts[0] if len(parts) == 1 else Together(tuple(parts))

@@ -92,10 +92,10 @@ def to_property_file(
 
     A file does not contain `limits`, `angles` and `spins`. If the tyre has no turn slip, its coefficients are left out.
 
-    **Raises** `InputError` for another kind of tyre, coefficients that are not finite scalars, and a `side` together with
-    `like`, which has its own side.
+    **Raises** `InputError` for another kind of tyre (also for a class derived from `MFTyre`, whose changes a file cannot hold),
+    coefficients that are not finite scalars, and a `side` together with `like`, which has its own side.
     """
-    if not isinstance(tyre, MFTyre):
+    if type(tyre) is not MFTyre:
         raise InputError(
             f"to_property_file: tyre = {type(tyre).__name__}: must be an MFTyre; for other laws use tyres.write_parameters."
         )

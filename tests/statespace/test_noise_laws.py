@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.stats
+from families import members
 
 from jaxveh import InputError
 from jaxveh import statespace as ss
@@ -202,6 +203,32 @@ def test_whiten_decorrelates_what_is_present():
 def test_errors(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+CONCRETE = [getattr(ss, name) for name in sorted(members("statespace", ss.AbstractNoise))]
+
+
+@pytest.mark.parametrize("kind", CONCRETE, ids=lambda kind: kind.__name__)
+def test_a_law_of_the_package_cannot_be_changed_in_part(kind):
+    """What a filter reads of it, its numbers, would be another law than what the class says."""
+    type(kind)("Renamed", (kind,), {"__module__": __name__, "__annotations__": {}, "more": lambda self: 1.0})
+    for name in ("log_prob", "sample", "covariance", "factor", "times", "names", "is_gaussian", "adds_up", "parts"):
+        with pytest.raises(TypeError, match=rf"Own\.{name}: cannot replace that of {kind.__name__}: .*AbstractNoise"):
+            type(kind)("Own", (kind,), {"__module__": __name__, "__annotations__": {}, name: lambda self: None})
+
+
+@pytest.mark.parametrize("kind", [ss.Continuous, ss.Discrete])
+def test_a_process_noise_of_a_derived_class_stays_itself_when_joined(kind):
+    class Half(kind):
+        def over(self, dt):
+            return super().over(dt).times(0.5)
+
+    for both in (
+        join(Half(ss.Gaussian({"a": 2.0})), kind(ss.Gaussian({"b": 2.0}))),
+        join(kind(ss.Gaussian({"b": 2.0})), Half(ss.Gaussian({"a": 2.0}))),
+    ):
+        law = both.over(jnp.asarray(1.0))
+        assert dict(zip(law.names, np.diagonal(law.covariance()), strict=True)) == {"a": 1.0, "b": 4.0}
 
 
 def test_process_noise_over_time_and_joined():

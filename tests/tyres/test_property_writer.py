@@ -146,6 +146,9 @@ def test_bad_tyres_are_refused():
     tyre = tyres.typical_mf_tyre(4000.0)
     with pytest.raises(InputError, match="Brush: must be an MFTyre"):
         tyres.to_property_file(tyres.Brush(8e4, 6e4))
+    worn = type(tyres.MFTyre)("Worn", (tyres.MFTyre,), {"__module__": __name__, "__annotations__": {}})
+    with pytest.raises(InputError, match="Worn: must be an MFTyre"):
+        tyres.to_property_file(worn(**{one.name: getattr(tyre, one.name) for one in dataclasses.fields(tyre)}))
     with pytest.raises(InputError, match=r"lateral\.PKY1 = nan: must be one finite number"):
         tyres.to_property_file(eqx.tree_at(lambda t: t.lateral.PKY1, tyre, jnp.asarray(jnp.nan)))
     with pytest.raises(InputError, match="has its own side"):
