@@ -3,7 +3,7 @@
 They say that nothing has changed, for every member of a family at once and cheaply; that it is right is said elsewhere, against
 closed forms, references and peers. Who changes a number on purpose records it anew and looks at the difference:
 
-    JAXVEH_RECORD=1 python -m pytest -n 0 -m "full or not full" -k recorded && git diff --stat tests/recorded
+    `COMMAND`, then git diff --stat tests/recorded
 """
 
 import dataclasses
@@ -16,6 +16,17 @@ import jax
 import numpy as np
 
 FOLDER = Path(__file__).parent / "recorded"
+
+COMMAND = 'JAXVEH_RECORD=1 python -m pytest -n 0 -m "full or not full" -k recorded'
+"""Without the `-m`, the cases that only `-m full` runs would stay without numbers."""
+
+TO_RECORD = f"record it by {COMMAND}, and look at the difference"
+
+
+def unrecorded(test_file, names):
+    """What of these names a test file has no numbers of, each with what to do."""
+    known = json.loads((FOLDER / f"{Path(test_file).stem}.json").read_text())
+    return [f"{name} has no numbers: {TO_RECORD}" for name in names if name not in known]
 
 
 def classes_of(*modules):
@@ -55,7 +66,7 @@ def check_words(test_file, name, found):
         known[name] = found
         path.write_text(json.dumps(dict(sorted(known.items())), indent=1) + "\n")
         return
-    assert name in known, f"{name} is not on record in {path.name}: see {Path(__file__).name}."
+    assert name in known, f"{name} is not on record in {path.name}: {TO_RECORD}"
     assert found == known[name]
 
 
@@ -83,7 +94,7 @@ def check_recorded(test_file, name, values, rtol=1e-7, given=False):
         known[name] = {at: [float(f"{number:.10g}") for number in leaf] for at, leaf in flat.items()}
         path.write_text(_one_leaf_a_line(known))
         return
-    assert name in known, f"{name} has no numbers on record in {path.name}: see {Path(__file__).name}."
+    assert name in known, f"{name} has no numbers on record in {path.name}: {TO_RECORD}"
     assert flat.keys() == known[name].keys()
     for at, leaf in flat.items():
         expected = np.asarray(known[name][at], float)

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
-from recorded_numbers import check_declared, check_recorded, classes_of
+from recorded_numbers import check_declared, check_recorded, classes_of, unrecorded
 from test_every_filter import CHANGES, FILTERS, GROUPS, MODELS, N, batch, noisier, recordings, same
 
 from jaxveh import Recording, filters, numerics, statespace
@@ -55,6 +55,14 @@ MORE = {
         filters.ParticleFilter(N), {"x0": 0.5, "x1": 0.5, "x2": 0.5}, (20, 60, N), 0.1, 0.9
     ),
 }
+
+
+def test_every_filter_and_setting_has_numbers():
+    """Most of those that `test_every_filter` compares are left to `-m full`."""
+    assert not unrecorded("test_every_filter.py", FILTERS)
+    assert not unrecorded(__file__, [*FILTERS, *MORE])
+
+
 FIRST = list({type(line.make()): name for name, line in reversed(FILTERS.items())}.values())
 """The first setting of every class."""
 

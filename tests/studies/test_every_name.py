@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from families import members
+from families import members, wanting
 from small_studies import study
 
 from jaxveh import InputError, estimators, filters, roads, sensors, studies, vehicles
@@ -103,7 +103,10 @@ def inner_of(name):
 
 def table_of(name):
     known = inspect.signature(studies.FILTERS[name]).parameters.values()
-    table = {p.name: NEEDED[p.name] for p in known if p.default is p.empty and p.name != "inner"}
+    needed = [p.name for p in known if p.default is p.empty and p.name != "inner"]
+    lacking = [one for one in needed if one not in NEEDED]
+    assert not lacking, f"{name} cannot do without {', '.join(lacking)}: add a value to NEEDED, or a reason to OBJECTS"
+    table = {one: NEEDED[one] for one in needed}
     return {"name": name, **table, **({"inner": inner_of(name)} if "inner" in [p.name for p in known] else {})}
 
 
@@ -154,7 +157,8 @@ TRUTHS = {
 
 def test_every_estimator_of_the_package_has_a_name():
     ready = {name.replace("_", "-") for name in estimators.__all__ if hasattr(getattr(estimators, name), "calibrate")}
-    assert set(studies.ESTIMATORS) == {"state-space"} | ready == set(TRUTHS)
+    assert set(studies.ESTIMATORS) == {"state-space"} | ready
+    assert not wanting(set(studies.ESTIMATORS), set(TRUTHS), {})
 
 
 @pytest.mark.parametrize("name", studies.ESTIMATORS)

@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from families import left_out, members
+from families import left_out, members, wanting
 from test_every_vehicle import CARS, ROUGH, SPEED, STEPS, in_mirror, inputs
 
 from jaxveh import InputError, io, statespace, tyres, vehicles
@@ -40,7 +40,10 @@ ONE_EACH = {}
 for _name, _car in CARS.items():
     ONE_EACH.setdefault(type(_car.make()).__name__, _name)
 STEERED = {kind: name for kind, name in ONE_EACH.items() if hasattr(innermost(CARS[name].make()), "steering")}
-"""The first car of each class, by class, of those whose wheels turn."""
+"""The first car of each class, by class, of those that take a steering."""
+
+UNSTEERED = {"Longitudinal": "goes straight"}
+"""Cars without a field `steering`, and why."""
 
 REFUSED = {
     ("Commanded", "RearSteering"): "inputs steer, steer_rear, v_x: must be steer and v_x",
@@ -88,7 +91,9 @@ def test_every_steering_and_every_steered_car_is_here():
     assert not left_out("vehicles", vehicles.AbstractSteering, [make() for make in STEERINGS.values()], {})
     assert set(STEERINGS) == members("vehicles", vehicles.AbstractSteering)
     assert set(ONE_EACH) == members("vehicles", vehicles.AbstractVehicle)
-    assert set(ONE_EACH) - set(STEERED) == {"Longitudinal"}, "goes straight"
+    assert not wanting(set(ONE_EACH), set(STEERED), UNSTEERED), (
+        "one takes a `steering`, or is in UNSTEERED with a reason"
+    )
     assert {kind.__name__ for kind in kit.STEERINGS.values()} == set(STEERINGS)
     assert tuple(kit.STEERINGS) == io.kit.STEERINGS
 
@@ -384,8 +389,8 @@ def test_a_car_s_file_makes_and_remembers_every_steering(name):
     said = dataclasses.replace(plain, steering=name, **SAID.get(name, {}))
     numbers = vehicles.numbers_of(said)
     for fidelity, kind in kit.FIDELITIES.items():
-        if fidelity in ("kinematic-trailer", "longitudinal", "roll-3dof", "roll-4dof", "fourteen-dof"):
-            continue  # no trailer, no wheels, and no suspension in a file
+        if fidelity in ("kinematic-trailer", "roll-3dof", "roll-4dof", "fourteen-dof") or kind.__name__ in UNSTEERED:
+            continue  # no trailer and no suspension in a file
         car = vehicles.specified_car(said, fidelity)
         assert type(car) is kind and type(car.steering) is kit.STEERINGS[name]
         leaves = [float(leaf) for leaf in jax.tree.leaves(car.steering)]
