@@ -8,16 +8,24 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import pytest
+from recorded_numbers import COMMAND, TO_RECORD
 
 import jaxveh
 
 ROOT = Path(jaxveh.__file__).parents[1]
 RECIPES = dict(re.findall(r"^\| an? ([\w ]+?) \| (.*) \|$", (ROOT / "CONTRIBUTING.md").read_text(), re.M))
+
+
+def calibrating(module):
+    module.calibrate = None
+    return module
+
+
 NEW = {
     "tyre law": ("tyres", lambda: type("Newcomer", (jaxveh.tyres.Brush,), {})),
     "filter or wrapper": ("filters", lambda: type("Newcomer", (jaxveh.filters.ParticleFilter,), {})),
     "vehicle": ("vehicles", lambda: type("Newcomer", (jaxveh.vehicles.SingleTrack,), {})),
-    "estimator": ("estimators", lambda: ModuleType("Newcomer")),
+    "estimator": ("estimators", lambda: calibrating(ModuleType("Newcomer"))),
     "paper": ("experiments", lambda: SimpleNamespace(run=None)),
 }
 
@@ -48,6 +56,12 @@ def test_there_are_five_and_their_places_exist():
         for place in places(recipe):
             path = ROOT / place
             assert path.parent.is_dir() if "<" in path.name else ("<" in place or path.exists()), place
+
+
+def test_the_commands_that_record_take_the_cases_of_the_full_run_too():
+    told = re.findall(r"`(JAXVEH_RECORD=1 [^`]*)`", (ROOT / "CONTRIBUTING.md").read_text())
+    assert len(told) >= 2 and set(told) == {COMMAND}
+    assert '-m "full or not full"' in COMMAND and COMMAND in TO_RECORD
 
 
 @pytest.mark.parametrize("recipe", NEW)
