@@ -1,4 +1,4 @@
-"""The defaults of what a room lists, and the constants of its modules, as recorded.
+"""The defaults of what the modules of a room define, and their constants, as recorded.
 
 A default and a threshold decide a user's numbers without standing in his code: a change of either shows in the difference.
 Fields of classes are on record with their families (`check_declared`).
@@ -23,13 +23,16 @@ ROOMS = sorted(
 )
 """Programs are told of in their help, and a paper's numbers in its criteria and tables."""
 
+MAKES = ("__init__", "__new__")
+"""The second is that of named tuples."""
+
 
 def defaults(made):
     """What a function, or a class and its methods, take without being told, as text by name."""
     if not inspect.isclass(made):
         return {"": said(made)} if callable(made) else {}
-    own = {name: one for name, one in vars(made).items() if inspect.isfunction(one)}
-    asked = {name: said(one) for name, one in own.items() if name == "__init__" or not name.startswith("_")}
+    own = {name: getattr(made, name) for name in vars(made) if inspect.isfunction(getattr(made, name))}
+    asked = {name: said(one) for name, one in own.items() if name in MAKES or not name.startswith("_")}
     return {name: text for name, text in asked.items() if text}
 
 
@@ -41,22 +44,28 @@ def said(function):
     )
 
 
-def listed(room):
-    """What a room and its kit list, by name."""
-    module = importlib.import_module(f"jaxveh.{room}")
-    kit = getattr(module, "kit", None) if "kit" in module.__all__ else None
-    return {name: getattr(place, name) for place in (module, kit) if place for name in place.__all__}
+def modules(room):
+    """The modules of a room by their name in it."""
+    package = importlib.import_module(f"jaxveh.{room}")
+    for one in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        yield one.name.removeprefix(f"jaxveh.{room}."), importlib.import_module(one.name)
+
+
+def defined(room):
+    """The functions and classes that the modules of a room define, listed or not, by their name in the room."""
+    for place, module in modules(room):
+        for node in ast.parse(inspect.getsource(module)).body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+                yield f"{place}.{node.name}", getattr(module, node.name)
 
 
 def constants(room):
     """The numbers in each constant that a module of a room defines, by its name in the room."""
-    package = importlib.import_module(f"jaxveh.{room}")
-    for one in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-        module = importlib.import_module(one.name)
+    for place, module in modules(room):
         for name in constant_names(module):
             found = list(numbers(getattr(module, name)))
             if found:
-                yield f"{one.name.removeprefix(f'jaxveh.{room}.')}.{name}", np.concatenate(found)
+                yield f"{place}.{name}", np.concatenate(found)
 
 
 def constant_names(module):
@@ -88,7 +97,7 @@ def numbers(thing):
 @pytest.mark.parametrize("room", ROOMS)
 def test_defaults_are_those_recorded(room):
     found = {}
-    for name, made in listed(room).items():
+    for name, made in defined(room):
         found |= {f"{name}.{method}".rstrip("."): text for method, text in defaults(made).items() if text}
     check_words(__file__, room, found)
 
