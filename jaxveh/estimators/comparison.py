@@ -54,7 +54,8 @@ def compare(
     it was named in `methods`, it **raises** `InputError` instead, as does an unknown name.
     """
     check_flags(smoothed=smoothed)
-    check_has("compare: quantity", quantity, ("METHODS",), "A module of a quantity has them: estimators.sideslip.")
+    asked = ("NAME", "METHODS", "estimate")
+    check_has("compare: quantity", quantity, asked, "A module of a quantity has them: estimators.sideslip.")
     check_kind("car", car, CarSpecification, "io.read_car reads one from a file.")
     check_recording("compare", recording)
     names = as_names(quantity.METHODS if methods is None else methods, "methods")

@@ -25,7 +25,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.contracts import Checked, contract
-from jaxveh._core.errors import InputError, check_one_of
+from jaxveh._core.errors import InputError, check_kind, check_one_of
 from jaxveh._core.estimated import Estimated
 from jaxveh._core.names import as_mapping, record
 from jaxveh._core.own_results import instance_of, several
@@ -198,7 +198,8 @@ TURNING = ("steer", "steering_wheel", "steering_torque", "yaw_rate", "a_y")
 
 def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: str) -> AbstractMethod:
     """The method of a name for a car's file, or the source itself if it is a method. **Raises** `InputError` for an unknown
-    name, and for a car with steered rear wheels unless the method reads no channel of `TURNING`."""
+    name, for methods that are no `MethodOfCar` or make none, and for a car with steered rear wheels unless the method reads no
+    channel of `TURNING`."""
     if isinstance(source, AbstractMethod):
         return source
     check_one_of(f"{who}: method", name, methods)
@@ -206,7 +207,10 @@ def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: s
         raise InputError(
             f"{who}: source = {type(source).__name__}: must be an io.CarSpecification, which io.read_car reads, or a method."
         )
-    method = methods[name].make(source.with_front_steering())
+    entry, place = methods[name], f"{who}: METHODS[{name!r}]"
+    check_kind(place, entry, MethodOfCar, "Such as MethodOfCar(lambda car: Mine(), 'what it is', 'its source').")
+    method = entry.make(source.with_front_steering())
+    check_kind(f"{place}.make(car)", method, AbstractMethod, "Derive it from estimators.AbstractMethod.")
     if any(need.channel in TURNING for need in method.needs):
         io.check_front_steered(source, f"{who}: {name}")
     return method

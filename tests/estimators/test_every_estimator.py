@@ -386,7 +386,9 @@ def test_a_calibration_of_one_s_own_estimator_is_read_by_its_module(tmp_path):
     own, other = ModuleType("own"), ModuleType("other")
     for module in (own, other):
         vars(module).update(vars(estimators.mass_and_grade), NAME=module.__name__)
-    made, path = calibration_of(own, case_of("mass_and_grade")), tmp_path / "calibration.toml"
+    file = dataclasses.replace(test_sideslip.CAR, wheel_radius=0.3)
+    made = calibration_of(own, SimpleNamespace(car=file, options={"a_x": 0.05}))
+    path = tmp_path / "calibration.toml"
     made.save(path)
     for kept in (estimators.read_calibration(path, estimator=own), estimators.Calibration.load(path, estimator=own)):
         assert kept.estimator == "own" and kept.told == made.told

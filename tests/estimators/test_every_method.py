@@ -262,3 +262,45 @@ def test_a_method_of_ones_own_is_a_source_and_another_thing_is_refused(quantity)
         module.estimate({}, log, method=named)
     with pytest.raises(InputError, match="are missing from the log|is missing from the log"):
         module.estimate(method, Recording(log.time, {}))
+
+
+class Steady(estimators.AbstractMethod):
+    """A method of one's own: the yaw rate as it is measured."""
+
+    @property
+    def needs(self):
+        return (kit.Need("yaw_rate", "rad/s"),)
+
+    def first(self, t, values):
+        return None, kit.answer({"turning": values["yaw_rate"]})
+
+    def next(self, memory, t, values):
+        return self.first(t, values)
+
+
+def quantity_of_ones_own(**changed):
+    own = ModuleType("own")
+    own.NAME, own.METHODS = "own", {"steady": estimators.MethodOfCar(lambda car: Steady(), "as measured", "ours")}
+    choose = lambda source, method: kit.method_of("own", own.METHODS, source, method)
+    own.estimate = lambda source, recording, *, method="steady": kit.follow("own", choose(source, method), recording)
+    vars(own).update(changed)
+    return own
+
+
+def test_a_quantity_of_ones_own_is_compared_and_what_it_lacks_is_named():
+    log = method_logs.log(Steady().needs)
+    found = estimators.compare(method_logs.CAR, log, quantity_of_ones_own())
+    np.testing.assert_array_equal(found.answers["steady"]["turning"], log["yaw_rate"])
+    made = estimators.MethodOfCar(lambda car: Steady, "its class", "ours")
+    for wrong, message in (
+        ({"METHODS": {"steady": Steady()}}, r"own: METHODS\['steady'\] = Steady: must be of the kind MethodOfCar"),
+        ({"METHODS": {"steady": Steady}}, r"own: METHODS\['steady'\] = .*: must be of the kind MethodOfCar"),
+        ({"METHODS": {"steady": made}}, r"METHODS\['steady'\]\.make\(car\) = .*: must be of the kind Method\."),
+    ):
+        with pytest.raises(InputError, match=message):
+            estimators.compare(method_logs.CAR, log, quantity_of_ones_own(**wrong), ["steady"])
+    for name in ("NAME", "METHODS", "estimate"):
+        own = quantity_of_ones_own()
+        delattr(own, name)
+        with pytest.raises(InputError, match=f"compare: quantity = .*; it has no {name}"):
+            estimators.compare(method_logs.CAR, log, own)
