@@ -14,8 +14,9 @@ from test_every_filter import pendulum
 
 from jaxveh import InputError, filters, numerics
 from jaxveh import statespace as ss
-from jaxveh._core.names import record_type
+from jaxveh._core.names import record, record_type
 from jaxveh.filters.choosing import log_of, score
+from jaxveh.filters.marginalised import _nonlinear_in
 from jaxveh.filters.transport import distances, transport_plan
 
 SEEDS = 60
@@ -237,6 +238,31 @@ class TestMarginalised:
         model = eqx.tree_at(lambda m: m.process_noise, linear_model(2, 1), ss.Continuous(ss.Gaussian({"x0": 0.1})))
         with pytest.raises(InputError, match="the drawn states x1 have no process noise"):
             filters.Marginalised(10, ("x0",)).check(model)
+
+    def test_a_function_of_the_states_within_is_found_nonlinear_wherever_it_is(self):
+        """At their means, which are zero, the last two seem linear; where all states move alike, the difference."""
+        functions = {
+            "linear": lambda x: x.z**2 * x.a - 3.0 * jnp.sin(x.z) * x.b + 5.0,
+            "square": lambda x: x.a**2,
+            "product": lambda x: x.a * x.b,
+            "difference": lambda x: (x.a - x.b) ** 2,
+            "small": lambda x: 1e-6 * x.b**2 + 1e3 * x.a,
+            "square_and_drawn": lambda x: x.z * x.a**2,
+            "product_and_drawn": lambda x: x.a * x.b * x.z,
+        }
+        names = ("z", "a", "b")
+        model = ss.StateSpace(
+            transition=lambda system, t0, t1, x, u: x._replace(b=x.z * x.a**2),
+            observation=lambda system, t, x, u: record("Seen", {name: f(x) for name, f in functions.items()}),
+            process_noise=ss.Continuous(ss.Gaussian(dict.fromkeys(names, 0.1))),
+            measurement_noise=ss.Gaussian(dict.fromkeys(functions, 0.1)),
+            prior=ss.Prior(record_type("Drawn", names)(0.0, 0.0, 0.0), dict.fromkeys(names, 2.0)),
+        )
+        states, channels = _nonlinear_in(("a", "b"), model)
+        np.testing.assert_array_equal(states, [False, False, True])
+        np.testing.assert_array_equal(channels, [name != "linear" for name in functions])
+        with pytest.raises(InputError, match="state b is not linear in a, b"):
+            filters.Marginalised(10, ("a", "b")).check(model)
 
     def test_spreads_count_those_within_and_between_particles(self):
         model, rows, exact = one()
