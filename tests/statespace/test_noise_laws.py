@@ -217,6 +217,16 @@ def test_a_law_of_the_package_cannot_be_changed_in_part(kind):
             type(kind)("Own", (kind,), {"__module__": __name__, "__annotations__": {}, name: lambda self: None})
 
 
+def test_a_law_of_ones_own_can_be_changed_in_part():
+    methods = dict.fromkeys(("sample", "log_prob", "covariance", "times"), lambda self, *given: None)
+    body = {"__module__": __name__, "__annotations__": {}, "names": ("a",), "has_covariance": False}
+    own = type(ss.AbstractNoise)("Own", (ss.AbstractNoise,), body | methods)
+    changed = type(own)(
+        "Changed", (own,), {"__module__": __name__, "__annotations__": {}, "sample": lambda self, *given: 1.0}
+    )
+    assert changed().sample(None) == 1.0 and own().sample(None) is None
+
+
 @pytest.mark.parametrize("kind", [ss.Continuous, ss.Discrete])
 def test_a_process_noise_of_a_derived_class_stays_itself_when_joined(kind):
     class Half(kind):
