@@ -73,7 +73,7 @@ def linear(car: SingleTrack) -> SingleTrack:
 
 
 def _linear_axle(tyre: AbstractTyre, load: jax.Array) -> Linear:
-    if isinstance(tyre, Linear):
+    if type(tyre) is Linear:
         return tyre
     return Linear(cornering_stiffness(tyre, Contact(slip_angle=jnp.zeros_like(load), load=load)))
 

@@ -1,5 +1,7 @@
 """Cars from a specification, and the linear baseline."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -56,3 +58,15 @@ def test_the_linear_car_has_the_same_slopes_at_the_static_loads(make):
     assert straight.mass == car.mass
     again = vehicles.linear(straight)
     assert again.front.cornering_stiffness == straight.front.cornering_stiffness
+
+
+def test_a_law_derived_from_the_linear_one_is_linear_in_the_linear_car():
+    class Saturating(Linear):
+        def forces(self, contact, state=None):
+            forces = super().forces(contact, state)
+            return forces._replace(F_y=5000.0 * jnp.tanh(2.0 * forces.F_y / 5000.0))
+
+    car = dataclasses.replace(vehicles.from_specification(specification()), front=Saturating(70e3))
+    straight = vehicles.linear(car)
+    assert type(straight.front) is Linear
+    np.testing.assert_allclose(straight.front.cornering_stiffness, 140e3)
