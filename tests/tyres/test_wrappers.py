@@ -199,6 +199,50 @@ def test_longitudinal_turns_a_law():
     np.testing.assert_allclose(turned, [vector(law, contact(0.05))[1], 0, 0, 0, 0], rtol=1e-14)
 
 
+class Told(tyres.AbstractTyre):
+    """A law that keeps the contacts that it is handed."""
+
+    handed: list = eqx.field(static=True)
+
+    def forces(self, contact, state=None):
+        self.handed.append(contact)
+        return tyres.Forces(F_x=contact.slip_ratio * contact.load, F_y=contact.slip_angle * contact.load)
+
+
+AT = Contact(0.03, 0.05, LOAD, 0.02, 0.8, 15.0, 2.4e5, 0.001, np.tan(0.03), 16.0, -1.0)
+"""A contact of which every field tells."""
+
+
+@pytest.mark.parametrize(
+    ("wrap", "changed"),
+    [
+        (tyres.LongitudinalLaw, {"slip_angle": 0.05, "lateral_slip": None, "slip_ratio": 0.0, "camber": 0.0}),
+        (
+            lambda law: tyres.FrictionEllipse(law, lateral()),
+            {"slip_angle": 0.0, "lateral_slip": None, "slip_ratio": ...},
+        ),
+        (
+            lambda law: tyres.FrictionEllipse(lateral(), law),
+            {"slip_ratio": 0.0, "slip_angle": ..., "lateral_slip": ...},
+        ),
+        (lambda law: tyres.OnRoad(law, 0.5), {"friction": 0.4}),
+    ],
+    ids=["LongitudinalLaw", "FrictionEllipse, along", "FrictionEllipse, across", "OnRoad"],
+)
+def test_a_law_inside_is_handed_the_contact_but_for_what_is_its_wrapper_s(wrap, changed):
+    """`...`: the slips of pure slip, which `test_ordinary_points.py` and the ellipse's own tests look at."""
+    law = Told([])
+    wrap(law).forces(jax.tree.map(jnp.asarray, AT))
+    assert law.handed
+    expected = {name: value for name, value in (AT._asdict() | changed).items() if value is not ...}
+    for at in law.handed:
+        for name, value in expected.items():
+            given = getattr(at, name)
+            assert (given is None) == (value is None), name
+            if value is not None:
+                np.testing.assert_allclose(given, value, rtol=1e-14, err_msg=name)
+
+
 @pytest.mark.parametrize("law", [tyres.Linear(60000.0), lateral(), brush(), tyres.Dugoff(80000.0, 60000.0)])
 def test_a_road_multiplies_the_contacts_friction(law):
     for friction in (1.0, 0.6):
