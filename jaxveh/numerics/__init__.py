@@ -32,6 +32,7 @@ from jaxveh.numerics.sums import total
 from jaxveh.numerics.tables import interpolate_linear, interpolate_smooth
 from jaxveh.numerics.tangents import derivative_alone
 from jaxveh.numerics.triangular import lower_factor
+from jaxveh.numerics.widths import as_wide_as
 from jaxveh.numerics.written_out import as_entries, as_whole, from_entries, scan_written_out, write_out
 
 __all__ = [
@@ -41,6 +42,7 @@ __all__ = [
     "arctan2",
     "as_entries",
     "as_whole",
+    "as_wide_as",
     "band_harmonics",
     "barriers_hold",
     "by_batch",

@@ -36,8 +36,8 @@ class FialaADAMS(AbstractTwoStiffnesses):
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_x, F_y (N) and M_z (N m)."""
         load = need_load(contact, "FialaADAMS")
-        kappa = contact.slip_ratio + 0.0 * load
-        tangent = numerics.tan(contact.slip_angle + 0.0 * load)
+        kappa = numerics.as_wide_as(contact.slip_ratio, load)
+        tangent = numerics.tan(numerics.as_wide_as(contact.slip_angle, load))
         limit = self._friction(kappa, tangent) * contact.friction * load
         F_x = self._longitudinal(kappa, limit)
 

@@ -54,7 +54,7 @@ class FialaPolynomial(AbstractTwoStiffnesses):
         F_x = self.slip_stiffness * contact.slip_ratio
         if not self.as_printed:
             F_x = jnp.clip(F_x, -limit, limit)
-        wish = self.cornering_stiffness * numerics.tan(contact.slip_angle + 0.0 * limit)
+        wish = self.cornering_stiffness * numerics.tan(numerics.as_wide_as(contact.slip_angle, limit))
         M_z = contact.direction * self._moment(wish, limit)
         return Forces(F_x=F_x, F_y=self._lateral(wish, limit), M_z=M_z)
 

@@ -24,10 +24,10 @@ def theoretical(contact: Contact):
 def practical(contact: Contact):
     """`kappa` and `tan(alpha)`: sliding speed over forward speed, with the signs of their forces."""
     if contact.lateral_slip is None:
-        angle = contact.slip_angle + 0.0 * contact.slip_ratio
-        return contact.slip_ratio + 0.0 * angle, numerics.tan(jnp.asarray(angle))
-    tangent = contact.lateral_slip + 0.0 * contact.slip_ratio
-    return contact.slip_ratio + 0.0 * tangent, tangent
+        angle = numerics.as_wide_as(contact.slip_angle, contact.slip_ratio)
+        return numerics.as_wide_as(contact.slip_ratio, angle), numerics.tan(jnp.asarray(angle))
+    tangent = numerics.as_wide_as(contact.lateral_slip, contact.slip_ratio)
+    return numerics.as_wide_as(contact.slip_ratio, tangent), tangent
 
 
 def length(x, y):

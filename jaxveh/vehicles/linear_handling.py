@@ -141,10 +141,10 @@ class LinearSingleTrack(AbstractOneTrack):
         return LateralSystem(
             a_11=-(C_f + C_r) / (m * v),
             a_12=-leverage / (m * v * v) - 1.0,
-            a_21=-leverage / J + 0.0 * v,
+            a_21=numerics.as_wide_as(-leverage / J, v),
             a_22=-(a * a * C_f + b * b * C_r) / (J * v),
             b_1=push / (m * v),
-            b_2=moment / J + 0.0 * v,
+            b_2=numerics.as_wide_as(moment / J, v),
             speed=v,
         )
 

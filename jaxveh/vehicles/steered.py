@@ -7,6 +7,7 @@ from typing import Any
 import equinox as eqx
 import jax
 
+from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
 from jaxveh._core.names import as_mapping, check_names, record, record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
@@ -97,8 +98,8 @@ class Steered(AbstractVehicle):
         steer = values.get("steer", u.steering_wheel / self.ratio)
         rest = {name: value for name, value in values.items() if name not in self.own_states}
         inner = self.vehicle.start(t, _steering(u, steer), **rest)
-        own = {"steer": steer + 0.0 * inner[0], "steer_rate": values.get("steer_rate", 0.0) + 0.0 * inner[0]}
-        return self.state_type(*inner, *[own[name] for name in self.own_states])
+        own = {"steer": steer, "steer_rate": values.get("steer_rate", 0.0)}
+        return self.state_type(*inner, *[numerics.as_wide_as(own[name], inner[0]) for name in self.own_states])
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         inner_x, inner_u = self._inner(x, u)

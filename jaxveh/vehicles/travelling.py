@@ -57,7 +57,7 @@ class Travelling(AbstractVehicle):
     def start(self, t, u, **values):
         check_names("start", values, self.state_type._fields)
         inner = self.vehicle.start(t, u, **{name: value for name, value in values.items() if name not in PLACE})
-        place = [values.get(name, 0.0) + 0.0 * inner[0] for name in PLACE]
+        place = [numerics.as_wide_as(values.get(name, 0.0), inner[0]) for name in PLACE]
         return self.state_type(*place, *inner)
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
