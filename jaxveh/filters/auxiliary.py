@@ -43,12 +43,13 @@ class FirstStage(NamedTuple):
 
     def weigh(self, log_n, drawn, plain, oftener, lost) -> SecondStage:
         """The second stage. `log_n`: the logarithm of the number of particles before the step, which with an adaptive number may
-        differ from that of this step; log weights (N,): `drawn` after a draw of ancestors, `plain` without one (an ordinary
-        importance step from the weights before); `oftener` (N,): by how much more often than by its weight each particle's
-        ancestor was drawn, as a logarithm; which particles are `lost`."""
+        differ from that of this step; log weights (N,): `drawn` after a draw of ancestors, `plain()` without one (an ordinary
+        importance step from the weights before, which has their number: not called where ancestors are always drawn);
+        `oftener` (N,): by how much more often than by its weight each particle's ancestor was drawn, as a logarithm; which
+        particles are `lost`."""
         log_first = self.log_mean
         if self.resampled is not None:
-            drawn = jnp.where(self.resampled, drawn, plain)
+            drawn = jnp.where(self.resampled, drawn, plain())
             log_first = jnp.where(self.resampled, log_first, -log_n)
             oftener = jnp.where(self.resampled, oftener, 0.0)
         weights, log_second, alive = numerics.normalise(without(lost, drawn))
@@ -85,7 +86,7 @@ class LookedAhead(AbstractAhead):
         chosen_ahead = gather((stage.ahead,), stage.ancestors)[0]
         log_n = jnp.log(jnp.asarray(before.weights.shape[0], logs.dtype))
         drawn = logs - chosen_ahead + log_chosen(filter_, log_of(stage.weights), stage.ancestors)
-        plain = logs + log_of(before.weights) + log_n
+        plain = lambda: logs + log_of(before.weights) + log_n
         weights, total, alive, remark = stage.weigh(
             log_n, drawn, plain, chosen_ahead - (stage.log_mean + log_n), self.lost
         )

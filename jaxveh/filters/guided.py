@@ -95,7 +95,7 @@ class Proposed(AbstractAhead):
         log_n = jnp.log(jnp.asarray(before.weights.shape[0], after.dtype))
         chosen_ahead = stage.ahead[stage.ancestors]
         drawn = after + self.ratio + kept - (chosen_ahead if filter_.auxiliary else 0.0)
-        plain = after + self.ratio + without(self.lost, log_of(before.weights)) + log_n
+        plain = lambda: after + self.ratio + without(self.lost, log_of(before.weights)) + log_n
         oftener = chosen_ahead - (stage.log_mean + log_n) if filter_.auxiliary else jnp.zeros_like(after)
         weights, total, alive, remark = stage.weigh(log_n, drawn, plain, oftener, self.astray)
         found = ParticleBelief(self.particles, weights, stage.ancestors, before.key, row.t, row.u, before.count + 1)

@@ -16,8 +16,10 @@ import scipy.stats
 from families import wanting
 from filter_systems import linear_model
 from nonlinear_systems import X, Y, as_recording, grid_filter, simulate
+from test_every_filter import FILTERS as EVERY
+from test_every_filter import linear, recordings
 
-from jaxveh import JaxvehWarning, Result, filters, numerics
+from jaxveh import InputError, JaxvehWarning, Result, filters, numerics
 from jaxveh import statespace as ss
 from jaxveh.numerics import resampling
 from jaxveh.statespace import driver
@@ -256,3 +258,21 @@ class TestTransport:
             driver.warn_of_remarks(found, filter_)
         slopes = jax.tree.leaves(slopes)
         assert all(np.isfinite(leaf).all() for leaf in slopes), slopes
+
+
+def test_the_number_of_particles_may_change_in_each_filter_that_takes_it():
+    """Whoever is not refused runs: the belief before a step has more particles than the step."""
+    model, rows = linear(), linear().rows(recordings("linear")[0])
+    taken = set()
+    for name, line in EVERY.items():
+        inner = line.make()
+        if not isinstance(inner, filters.AbstractParticleFilter):
+            continue
+        try:
+            changing = filters.AdaptiveNumber(inner, {"x0": 0.5}, (20, inner.particles))
+        except InputError:
+            continue
+        taken.add(type(inner).__name__)
+        found = jax.eval_shape(lambda key, one=changing: filters.scan(one, model, rows, key), jax.random.key(0))
+        assert found.belief.weights.shape == (inner.particles,), name
+    assert {"ParticleFilter", "AuxiliaryParticleFilter", "Guided"} <= taken
