@@ -142,7 +142,7 @@ def test_all_particles_dead(filter_):
 
     gradients, estimate = jax.jit(jax.jacrev(of, has_aux=True))(model)
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(gradients))
-    assert np.abs(gradients.measurement_noise.std.flow).max() > 0
+    assert np.abs(gradients.measurement_noise.inside.std.flow).max() > 0
     assert Result(int(estimate.result)) is Result.all_particles_dead
     assert int(estimate.failed_at) == 4
     assert np.asarray(estimate.info.log_likelihood)[4] == -np.inf
