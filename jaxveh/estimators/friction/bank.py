@@ -44,34 +44,35 @@ class Bank(NamedTuple):
 
 
 class BankMemory(NamedTuple):
-    """The last motion, `told`; the filters, `bank`; and the memory of the wheel slips, `along` (None for a file without the
-    wheels' radius and inertia)."""
+    """The last motion, `told`; the filters, `bank`; the memory of the wheel slips, `along` (None for a file without the wheels'
+    radius and inertia); and for how long the friction has been certain, `certain` (s)."""
 
     told: Told
     bank: Bank
     along: Any
+    certain: Any
 
 
 class FrictionBank(AbstractMethod):
     """Friction by a bank of filters, one per friction, whose weights are the probabilities of the frictions.
 
     Each filter is an extended Kalman filter of a single track whose axle curves are scaled by friction (`SimilarCurve`). Errors
-    that could be mistaken for friction are states: the axles' stiffness errors, the offsets of accelerometer and steer. In each
+    that could be mistaken for friction are states: the axles' stiffness errors, the offsets of accelerometer and steer. They
+    last, so that what the drive has shown of them helps to tell a slippery road from soft axles at once. In each
     row the filters are mixed (interacting multiple models, Blom & Bar-Shalom 1988): friction walks slowly, and sometimes jumps
     to any value. So old evidence is forgotten, a jump is followed as fast as the forces show it, and the standard deviation
     reflects missing excitation: forces in the linear range only show that there is more friction than they use. If the log has
     torques and wheel speeds and the car's file has the wheels' radius and inertia, longitudinal slips also weight the frictions
     (`AlongEvidence`). A friction that could not have carried the measured acceleration is not possible.
 
-    The answer is the median and the standard deviation about it. `known`: the probability that the friction is within 20 % of the
-    median is at least `certainty`, and all of these frictions are within those of the bank. The estimate is the road's friction
-    over that on which the car's tyre parameters hold, one value for all wheels.
+    The answer is the median and the standard deviation about it. `known`: for the last `certain_time` (s), the probability that
+    the friction is within 20 % of the median was at least `certainty`, and all of these frictions are within those of the bank.
+    The estimate is the road's friction over that on which the car's tyre parameters hold, one value for all wheels.
 
     `frictions` (K,) of the filters and `prior` (K,), their probabilities without information; `jumps` (1/s): rate of jumps to any
     friction; `walk` (1/sqrt(s)): random walk of ln mu; `turn_time`, `force_time` (s): innovations of yaw rate and of a_y closer
-    than this count as one; `stiffness_spread` (-) of an axle's slope, which changes within `stiffness_time` (s) and so absorbs
-    errors of the curve; `steer_noise` (rad), play included, and `offset_spread` (rad), the standard deviation of an
-    offset that stays;
+    than this count as one; `stiffness_spread` (-) of an axle's slope, which changes within `stiffness_time` (s);
+    `steer_noise` (rad), play included, and `offset_spread` (rad), the standard deviation of an offset that stays;
     `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5): model errors;
     `a_y_noise` (m/s^2) and `force_noise` (-), a share of the measured a_y; `yaw_rate_noise` (rad/s).
 
@@ -88,13 +89,14 @@ class FrictionBank(AbstractMethod):
     walk: jax.Array = positive("1/sqrt(s)", default=0.03)
     turn_time: jax.Array = positive("s", default=0.011)
     force_time: jax.Array = positive("s", default=0.03)
-    certainty: jax.Array = parameter("-", scale=0.1, default=0.94)
-    stiffness_spread: jax.Array = positive("-", default=0.15)
-    stiffness_time: jax.Array = positive("s", default=3.0)
+    certainty: jax.Array = parameter("-", scale=0.1, default=0.97)
+    certain_time: jax.Array = positive("s", default=0.5)
+    stiffness_spread: jax.Array = positive("-", default=0.2)
+    stiffness_time: jax.Array = positive("s", default=200.0)
     steer_noise: jax.Array = positive("rad", default=0.0007)
     offset_spread: jax.Array = positive("rad", default=0.004)
-    v_y_noise: jax.Array = positive("m/s^1.5", default=0.15)
-    yaw_noise: jax.Array = positive("rad/s^1.5", default=0.03)
+    v_y_noise: jax.Array = positive("m/s^1.5", default=0.06)
+    yaw_noise: jax.Array = positive("rad/s^1.5", default=0.012)
     a_y_noise: jax.Array = positive("m/s^2", default=0.1)
     force_noise: jax.Array = positive("-", default=0.03)
     yaw_rate_noise: jax.Array = positive("rad/s", default=0.004)
@@ -106,8 +108,8 @@ class FrictionBank(AbstractMethod):
 
     def first(self, t, values):
         bank = Bank(jnp.log(self._prior()), *self._start())
-        memory = BankMemory(start_told(t, values), bank, None if self.along is None else self.along.start(t))
-        return memory, self._answer(bank, memory.told)
+        along = None if self.along is None else self.along.start(t)
+        return self._said(BankMemory(start_told(t, values), bank, along, jnp.zeros_like(t)), 0.0)
 
     def next(self, memory, t, values):
         dt = jnp.clip(t - memory.told.t, 0.0, 1.0)
@@ -127,7 +129,7 @@ class FrictionBank(AbstractMethod):
             keep(moved.means, means),
             keep(moved.covariances, covariances),
         )
-        return BankMemory(told, bank, along), self._answer(bank, told)
+        return self._said(BankMemory(told, bank, along, memory.certain), dt)
 
     def _prior(self):
         return self.prior / jnp.sum(self.prior)
@@ -243,8 +245,9 @@ class FrictionBank(AbstractMethod):
         excess = jnp.maximum(numerics.hypot(told.a_x, a_y) - SLOPES - most, 0.0)
         return -0.5 * jnp.minimum(dt / LASTING, 1.0) * jnp.square(excess / (3.0 * self.a_y_noise))
 
-    def _answer(self, bank: Bank, told: Told):
-        weights = jnp.exp(bank.weights)
+    def _said(self, memory: BankMemory, dt):
+        """The memory with the time for which the friction has been certain, `dt` (s) after the last row, and the answer."""
+        weights = jnp.exp(memory.bank.weights)
         logs = jnp.log(self.frictions)
         median = jnp.exp(_quantile(logs, weights, 0.5))
         spacing = (logs[-1] - logs[0]) / (len(logs) - 1)
@@ -253,8 +256,11 @@ class FrictionBank(AbstractMethod):
         near = jnp.sum(jnp.where(jnp.abs(logs - jnp.log(median)) < NEAR, weights, 0.0))
         # The forces may speak for a friction outside the bank, whose probability gathers at its ends.
         inside = (jnp.abs(jnp.log(median) - 0.5 * (logs[0] + logs[-1])) + NEAR) < 0.5 * (logs[-1] - logs[0])
-        known = told.moves & inside & (near >= self.certainty)
-        return answer({"friction": median}, {"friction": std}, known)
+        certain = memory.told.moves & inside & (near >= self.certainty)
+        # Just after a jump, a lag of the tyres' forces can pass for another friction.
+        lasted = jnp.where(certain, memory.certain + dt, 0.0)
+        said = answer({"friction": median}, {"friction": std}, certain & (lasted >= self.certain_time))
+        return memory._replace(certain=lasted), said
 
 
 def scalar_update(x, P, measured, observation, variance):
