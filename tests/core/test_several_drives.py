@@ -79,5 +79,5 @@ def test_an_open_loop_refuses_gaps(name):
 
 
 def test_a_quantity_to_compare_is_a_module():
-    with pytest.raises(InputError, match="quantity = 'sideslip': must be an object with METHODS"):
+    with pytest.raises(InputError, match="quantity = 'sideslip': must be an object with NAME, METHODS"):
         estimators.compare(SPECIFICATION, drive(TIME), "sideslip")

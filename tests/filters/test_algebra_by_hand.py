@@ -246,14 +246,16 @@ def test_the_second_stage_weighs_by_hand(resampled):
     stage = FirstStage(
         None, None, jnp.asarray(log_mean), None, None if resampled is None else jnp.asarray(resampled), True
     )
-    found = stage.weigh(*map(jnp.asarray, (log_n, drawn, plain, np.zeros(4), lost)))
+    weigh = lambda stage: stage.weigh(
+        jnp.asarray(log_n), jnp.asarray(drawn), lambda: jnp.asarray(plain), jnp.zeros(4), jnp.asarray(lost)
+    )
+    found = weigh(stage)
     mass = np.where(lost, 0.0, np.exp(plain if resampled is False else drawn))
     np.testing.assert_allclose(found.weights, mass / mass.sum(), rtol=1e-12)
     first = log_mean + log_n if resampled is not False else 0.0
     np.testing.assert_allclose(found.log_likelihood, first + np.log(mass.mean()), rtol=1e-12)
     assert bool(found.alive) and int(found.remark) == Result.successful
-    dead = stage._replace(alive=jnp.asarray(False))
-    assert not bool(dead.weigh(*map(jnp.asarray, (log_n, drawn, plain, np.zeros(4), lost))).alive)
+    assert not bool(weigh(stage._replace(alive=jnp.asarray(False))).alive)
 
 
 @pytest.mark.parametrize(("threshold", "chooses"), [(0.0, False), (0.8, False), (0.9, True), (1.0, True)])
