@@ -184,17 +184,18 @@ def test_a_friction_is_known_once_it_has_been_certain_for_half_a_second():
     assert 0.2 < after.mean() < certain.mean() - 0.02
 
 
-def test_a_steer_that_is_off_makes_no_friction_known_on_a_dry_road():
-    """By a degree at the road wheels, which the file does not say: no row looks slippery."""
+@pytest.mark.parametrize("degrees", [0.6, 1.0])
+def test_a_steer_that_is_off_makes_no_friction_known_on_a_dry_road(degrees):
+    """By so much at the road wheels, which the file does not say: no row looks slippery."""
     drive = lateral_drive(1.0, active(0.02))
-    drive = drive | {"steer": drive["steer"] + np.radians(1.0)}
+    drive = drive | {"steer": drive["steer"] + np.radians(degrees)}
     said = estimated("bank", drive)
-    assert not np.asarray(said.known.friction).any()
+    assert not np.asarray(said.known.friction).any() and np.min(said["friction"]) > 0.68
     # The filter without the offset as a state is misled.
     method = dataclasses.replace(friction.METHODS["bank"].make(CAR).inner, offset_spread=jnp.asarray(1e-6))
     units = {need.channel: need.unit for need in method.needs if need.channel in drive}
     misled = friction.estimate(method, Recording(T, {n: drive[n] for n in units}, units))
-    assert np.min(misled["friction"]) < 0.5 < 0.68 < np.min(said["friction"])
+    assert np.min(misled["friction"]) < (0.5 if degrees == 1.0 else np.min(said["friction"]))
 
 
 @pytest.mark.parametrize("along", [True, False])
@@ -206,8 +207,8 @@ def test_a_friction_that_could_not_carry_the_acceleration_is_not_possible(along)
     row = lambda k: {n.channel: jnp.asarray(drive.get(n.channel, T * np.nan)[k]) for n in method.needs}
     memory, _ = method.first(jnp.asarray(0.0), row(0))
     low, step = np.asarray(method.frictions) < 0.3, eqx.filter_jit(lambda *given: method.next(*given))
-    # A second: in the first half of it, the states that could explain the bend are still unknown.
-    for k in range(1, 100):
+    # In the bend, it takes up to 0.9 s since the stiffness errors last: what could explain the bend is still unknown before.
+    for k in range(1, 60 if along else 100):
         memory, _ = step(memory, jnp.asarray(T[k]), row(k))
     assert np.exp(np.asarray(memory.bank.weights))[low].sum() < 0.01 < 0.1 < np.asarray(method._prior())[low].sum()
 

@@ -58,9 +58,9 @@ class FrictionBank(AbstractMethod):
 
     Each filter is an extended Kalman filter of a single track whose axle curves are scaled by friction (`SimilarCurve`). Errors
     that could be mistaken for friction are states: the axles' stiffness errors, the offsets of accelerometer and steer. They
-    last, so that what the drive has shown of them helps to tell a slippery road from soft axles at once. In each
-    row the filters are mixed (interacting multiple models, Blom & Bar-Shalom 1988): friction walks slowly, and sometimes jumps
-    to any value. So old evidence is forgotten, a jump is followed as fast as the forces show it, and the standard deviation
+    last, so that what the drive has shown of them helps to tell a slippery road from soft axles at once. In each row the
+    filters are mixed (interacting multiple models, Blom & Bar-Shalom 1988): friction walks slowly, and sometimes jumps to any
+    value. So old evidence is forgotten, a jump is followed as fast as the forces show it, and the standard deviation
     reflects missing excitation: forces in the linear range only show that there is more friction than they use. If the log has
     torques and wheel speeds and the car's file has the wheels' radius and inertia, longitudinal slips also weight the frictions
     (`AlongEvidence`). A friction that could not have carried the measured acceleration is not possible.
@@ -72,14 +72,14 @@ class FrictionBank(AbstractMethod):
     `frictions` (K,) of the filters and `prior` (K,), their probabilities without information; `jumps` (1/s): rate of jumps to any
     friction; `walk` (1/sqrt(s)): random walk of ln mu; `turn_time`, `force_time` (s): innovations of yaw rate and of a_y closer
     than this count as one; `stiffness_spread` (-) of an axle's slope, which changes within `stiffness_time` (s);
-    `steer_noise` (rad), play included, and `offset_spread` (rad), the standard deviation of an offset that stays;
-    `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5): model errors;
-    `a_y_noise` (m/s^2) and `force_noise` (-), a share of the measured a_y; `yaw_rate_noise` (rad/s).
+    `steer_noise` (rad), play included, and `offset_spread` (rad), the standard deviation of an offset that stays; `v_y_noise`
+    (m/s^1.5), `yaw_noise` (rad/s^1.5): model errors; `a_y_noise` (m/s^2) and `force_noise` (-), a share of the measured a_y;
+    `yaw_rate_noise` (rad/s).
 
     The weights are no exact likelihoods: all frictions share one innovation variance, because separate ones would favour low
     friction wherever the noise is overestimated. The standard deviation therefore depends on noises that were chosen on simulated
-    cars; it is too large on some cars and too small on others. A known friction stays known for up to a few seconds after a jump
-    without excitation.
+    cars and one real log; it is too large on some cars and too small on others. A known friction stays known for up to a few
+    seconds after a jump without excitation.
     """
 
     car: PlanarCar
