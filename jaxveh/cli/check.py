@@ -20,6 +20,9 @@ from jaxveh.diagnostics import kit
 
 ORDER = tuple(COLOURS)
 
+WIDEST = 32
+"""The greatest width of the channels' names beside their messages; some loggers write paths of sixty letters."""
+
 
 def check(
     log: options.Log,
@@ -75,7 +78,7 @@ def _print(log: Path, recording: Recording, findings) -> None:
     console.print(Text(log.name, "bold"), f"{rows} rows from {kit.shown_time(start, end)} s{step}")
     lines = Table.grid(padding=(0, 2))
     lines.add_column(justify="right")
-    lines.add_column(no_wrap=True)
+    lines.add_column(overflow="fold", max_width=WIDEST)
     lines.add_column(overflow="fold")
     for severity in ORDER:
         for finding in findings:

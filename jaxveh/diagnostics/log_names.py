@@ -5,14 +5,21 @@ from __future__ import annotations
 import re
 
 from jaxveh.diagnostics.log_findings import LogFinding, LogView
-from jaxveh.io import CANONICAL
+from jaxveh.io import CANONICAL, kit
 
 USUAL = ("v_x", "yaw_rate", "a_y", "steer")
 """The channels that the checks and the estimators of sideslip compare."""
 
 
+MOST_LIKELY = 3
+"""The number of channels that a finding names."""
+
+INSTEAD = {"v_x": ("speed", "wheel_speed_fl", "wheel_speed_rl"), "steer": ("steering_wheel", "steer_fl", "steer_left")}
+"""Channels from which the programs find another one: their names are enough."""
+
+
 def check_names(log: LogView) -> list[LogFinding]:
-    """Report channels whose names differ from a known one only in capitals and signs, and a log without any known channel."""
+    """Report channels whose names look like known ones, and a log without any known channel."""
     findings = []
     plain = {_plain(name): name for name in CANONICAL}
     for name in log.channels:
@@ -20,6 +27,12 @@ def check_names(log: LogView) -> list[LogFinding]:
         if name not in CANONICAL and meant is not None and meant not in log.channels:
             message = f"is not used: the name of this channel is {meant}. Rename it, or name it in a channel map (--channels)."
             findings.append(LogFinding("warning" if meant in USUAL else "note", name, message, {}))
+    told = {finding.channel for finding in findings}
+    for wanted in USUAL:
+        alike = [name for name in kit.likely_names(wanted, log.channels) if name not in told]
+        there = any(name in log.channels for name in (wanted, *INSTEAD.get(wanted, ())))
+        if alike and not there and not told & set(kit.likely_names(wanted, log.channels)):
+            findings.append(_likely(wanted, alike))
     if not findings and not any(name in CANONICAL for name in log.channels):
         known = ", ".join(USUAL)
         message = (
@@ -27,6 +40,16 @@ def check_names(log: LogView) -> list[LogFinding]:
         )
         findings.append(LogFinding("warning", "names", message, {}))
     return findings
+
+
+def _likely(wanted: str, alike: list[str]) -> LogFinding:
+    """The finding that a channel is not there, while others look like it."""
+    meant = "steer, or steering_wheel if it is the angle of the steering wheel" if wanted == "steer" else wanted
+    message = (
+        f"may be {meant}, which is not there under that name, and is not used: name it in a channel map (--channels), with its "
+        "unit and sign."
+    )
+    return LogFinding("warning", ", ".join(alike[:MOST_LIKELY]), message, {})
 
 
 def _plain(name: str) -> str:

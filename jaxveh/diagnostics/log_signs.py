@@ -74,9 +74,15 @@ def check_signs(log: LogView) -> list[LogFinding]:
     wheels = _wheels_over_speed(log)
     if wheels is not None and _SAME[0] < wheels < _SAME[1]:
         # Accelerations that were planned, not measured, must not refute a speed that the wheels confirm.
-        sure = lambda one: one.severity == "error" and one.channel == "v_x"
-        return [one._replace(severity="warning") if sure(one) else one for one in findings]
+        return [_refuted(one) if one.severity == "error" and one.channel == "v_x" else one for one in findings]
     return findings
+
+
+def _refuted(finding: LogFinding) -> LogFinding:
+    """A finding that v_x is in another unit, of a log in which the wheels say that it is not."""
+    name, story = finding.message.partition(":")[0].split(" ", 1)
+    message = f"{story}, but the wheels confirm v_x: was it planned, not measured, or is its scale wrong?"
+    return finding._replace(severity="warning", channel=name, message=message)
 
 
 def _correlation(log: LogView, most: float = np.inf) -> float:
@@ -228,6 +234,7 @@ def _slope(name: str, other: str, line: tuple[float, float, float], table: dict,
     if factors and abs(intercept) < SHIFTED:
         nearest = min(factors, key=lambda factor: abs(np.log(slope / factor)))
         channel, unit = factors[nearest]
+        story = story if channel == name else f"{name} {story}"
         return LogFinding("error", channel, f"{story}: {channel} looks like {unit}. Set it in the channel map.", values)
     return LogFinding(
         "warning", name, f"{story}, which should be 1: a wrong unit or scale, or a car that slides?", values

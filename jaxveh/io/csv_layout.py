@@ -12,6 +12,7 @@ from typing import NamedTuple
 from jaxveh._core.errors import InputError
 from jaxveh.io.channel_map import ChannelMap
 from jaxveh.io.decimals import is_number
+from jaxveh.io.naming import split_unit
 from jaxveh.io.stamps import is_stamp
 from jaxveh.io.units import is_unit, is_unit_name, without_brackets
 
@@ -82,10 +83,23 @@ def _layout(
     above = [line for line in lines[:names] if line.strip() and not line.startswith(COMMENT)]
     if len(above) > (said is not None) and not (told and told.names_line):
         remarks.append(f"the columns' names are in line {names + 1}; the lines above are not read")
-    told_units = [] if units is None else map(without_brackets, _split(lines[units], separator))
-    by_name = dict(zip(headings, told_units, strict=False))
+    below = [k + 1 for k in range(names + 1, first) if k != units and not _is_blank(lines[k])]
+    if below and not (told and told.names_line):
+        remarks.append(f"between the names and the rows, line {', '.join(map(str, below))} is not read")
+    told_units = [] if units is None else [without_brackets(one) for one in _split(lines[units], separator)]
+    by_name = dict(zip([*headings, *with_numbers(headings)], [*told_units, *told_units], strict=False))
     decimal = (told.decimal if told else None) or _decimal(lines[first:], separator)
     return Layout(headings, by_name, first, separator, decimal, encoding, tuple(remarks))
+
+
+def with_numbers(headings: Sequence[str]) -> list[str]:
+    """Return the headings, those of several columns with the number of the column, such as `speed (column 14) [km/h]`."""
+
+    def of(heading: str, column: int) -> str:
+        name, unit = split_unit(heading)
+        return f"{name} (column {column})" + (f" [{unit}]" if unit else "")
+
+    return [h if headings.count(h) == 1 else of(h, k) for k, h in enumerate(headings, start=1)]
 
 
 def text_encoding(path: Path, told: str | None) -> tuple[str, str]:
@@ -170,12 +184,18 @@ def _alike(lines: Sequence[str], first: int, separator: str) -> tuple[int, ...]:
 
 
 def _above(lines: Sequence[str], first: int, separator: str, counts: tuple[int, ...]) -> tuple[int, int | None] | None:
-    """Return the lines of names and units above the first row, which has one of these numbers of cells; None without names."""
-    above = [k for k in range(first) if not _is_blank(lines[k])][-2:]
-    fits = lambda cells: _filled(cells) in counts and _are_words(cells)
+    """Return the lines of names and units above the first row, which has one of these numbers of cells; None without names.
+
+    The units are in the line above the rows. They may also be in the one before it, if the last line has cells that are empty or
+    alike, such as the sources of the columns: it names none.
+    """
+    above = [k for k in range(first) if not _is_blank(lines[k])][-3:]
     cells = [_split(lines[k], separator) for k in above]
-    if len(above) == 2 and _are_units(cells[1]) and fits(cells[0]):
-        return above[0], above[1]
+    fits = lambda one: _filled(one) in counts and _are_words(one)
+    names_none = len(above) > 2 and len(set(cells[-1])) < len(cells[-1])
+    for last in range(len(above) - 1, 0 if names_none else max(0, len(above) - 2), -1):
+        if _are_units(cells[last]) and fits(cells[last - 1]):
+            return above[last - 1], above[last]
     return (above[-1], None) if above and fits(cells[-1]) else None
 
 

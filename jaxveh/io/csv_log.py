@@ -13,8 +13,9 @@ import numpy as np
 from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import ChannelMap
-from jaxveh.io.csv_layout import BLANKS, Layout, find_layout
+from jaxveh.io.csv_layout import BLANKS, Layout, find_layout, with_numbers
 from jaxveh.io.log import TableLog
+from jaxveh.io.naming import split_unit
 from jaxveh.io.optional import require
 from jaxveh.io.units import is_unit, same_unit
 
@@ -25,10 +26,14 @@ MISSING = ["-", "--", "---", "#NV", "n.a."]
 def open_csv(path: Path, channels: ChannelMap | None) -> TableLog:
     """Open a text file with columns: names, perhaps a line of units, and rows; see `csv_layout.find_layout`.
 
-    The channel map gives what is not to be searched for. What was assumed is told in a `JaxvehWarning`.
+    The channel map gives what is not to be searched for. What was assumed is told in a `JaxvehWarning`. Of several columns
+    with one name, each can be loaded with its number, such as `speed (column 14)`.
     """
     table = read_columns(path, channels)
-    return TableLog(path, table.headings, table.cells.__getitem__, table.units, "", channels, table.point)
+    more = [one for one in with_numbers(table.headings) if one not in table.headings]
+    log = TableLog(path, [*table.headings, *more], table.cells.__getitem__, table.units, "", channels, table.point)
+    log.names = tuple(name for name in log.names if name not in {split_unit(one)[0] for one in more})
+    return log
 
 
 class TextTable(NamedTuple):
@@ -52,7 +57,8 @@ def read_columns(path: Path, told: ChannelMap | None = None) -> TextTable:
         warnings.warn(f"{path}: {'; '.join(layout.remarks)}.", JaxvehWarning, stacklevel=2)
     headings = _named(layout.headings, frame)
     _tell_short_rows(path, layout, headings, frame, "strict")
-    return TextTable(headings, _cells(headings, frame), layout.units, layout.decimal)
+    cells = _cells(with_numbers(headings), frame) | _cells(headings, frame)
+    return TextTable(headings, cells, layout.units, layout.decimal)
 
 
 def read_below(

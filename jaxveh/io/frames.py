@@ -12,7 +12,8 @@ from jaxveh._core.errors import InputError, check_flags
 from jaxveh._core.names import as_mapping
 from jaxveh._core.recording import Recording, check_recording
 from jaxveh.io.canonical import canonical_unit
-from jaxveh.io.log import numeric, split_unit
+from jaxveh.io.log import numeric
+from jaxveh.io.naming import split_unit
 from jaxveh.io.optional import require
 from jaxveh.io.recordings import write_columns
 from jaxveh.io.stamps import seconds

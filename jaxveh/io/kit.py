@@ -3,8 +3,10 @@
 from jaxveh.io.car import CAR_SCHEMA, STEERINGS, car_lines, car_of_toml
 from jaxveh.io.channel_map import CHANNEL_MAP_SCHEMA
 from jaxveh.io.datasets import dataset_of, frame_of, of_dataset
+from jaxveh.io.likely_names import likely_names
 from jaxveh.io.mcap_log import MCAP_SUFFIX
 from jaxveh.io.naming import check_known
+from jaxveh.io.nested_log import in_words
 from jaxveh.io.optional import require
 from jaxveh.io.property_file import PROPERTY_UNITS, Entry, parse_property_file
 from jaxveh.io.result_files import RESULT_SUFFIXES, load_result, save_result
@@ -31,7 +33,9 @@ __all__ = [
     "check_known",
     "dataset_of",
     "frame_of",
+    "in_words",
     "is_unit",
+    "likely_names",
     "load_result",
     "of_dataset",
     "parse_property_file",

@@ -14,18 +14,18 @@ from jaxveh._core.errors import InputError
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap
 from jaxveh.io.decimals import decimal
-from jaxveh.io.naming import check_known, listing
+from jaxveh.io.likely_names import likely_names, unit_of_ending
+from jaxveh.io.naming import check_known, listing, split_unit
+from jaxveh.io.repeats import without_repeats
 from jaxveh.io.stamps import seconds
 from jaxveh.io.toml import shorten
-from jaxveh.io.units import convert, is_unit, is_unit_name
+from jaxveh.io.units import convert, is_unit
 
 TIME_NAMES = ("time", "timestamps", "timestamp", "t")
 """Names by which a time column is found, in this order and in any case."""
 
-# `wheel[3]` is a name, `speed [km/h]` is a name and a unit; `speed (km/h)` too, but not `speed (GPS)`.
-_UNIT_IN_NAME = re.compile(r"^(?P<name>.*\S)\s*\[(?!\d+\])(?P<unit>[^\[\]]*)\]$")
-_UNIT_IN_ROUND = re.compile(r"^(?P<name>.*\S)\s*\((?!\d+\))(?P<unit>[^()]+)\)$")
-
+MOST_LIKELY = 3
+"""The number of columns that a message proposes."""
 
 _SWAP = str.maketrans(",.", ".,")
 
@@ -85,7 +85,8 @@ class TableLog(Log):
         plain = {h: (h, units[h]) if h in units else split_unit(h) for h in headings}
         shorts = [name for name, _ in plain.values()]
         alike = {name for name in shorts if shorts.count(name) > 1}
-        if told := sorted(name for name in alike if canonical_unit(name) is not None):
+        told = sorted(name for name in alike if canonical_unit(name) is not None)
+        if told and not (channels and channels.channels):
             raise InputError(
                 f"{path}: several columns have the same name without their [unit], {told[0]!r}; rename them."
             )
@@ -107,6 +108,9 @@ class TableLog(Log):
         name, stamps = self._plain(name), self._stamps(self._plain(time.column), time)
         rows = np.isfinite(stamps)
         stamps, values = stamps[rows], self._values(name)[rows]
+        # A row of what each device said last repeats samples.
+        if (joined := without_repeats(stamps, {name: values})) is not None:
+            stamps, values = joined[0], joined[1][name]
         if np.any(np.diff(stamps) <= 0):
             k = int(np.argmax(np.diff(stamps) <= 0))
             raise InputError(
@@ -129,9 +133,11 @@ class TableLog(Log):
             for name in (wanted, *self._heading):
                 if name in self._heading and name.casefold() == wanted:
                     return name
+        alike = likely_names("time", self._heading)
+        first = f" {', '.join(alike[:MOST_LIKELY])} may be it." if alike else ""
         raise InputError(
-            f"{self.path}: no time column ({', '.join(TIME_NAMES)}); {listing('time', self._heading)}. "
-            'Name it in a channel map: time = "COLUMN".'
+            f"{self.path}: no time column ({', '.join(TIME_NAMES)}); {listing('time', self._heading)}.{first} "
+            'Name it in a channel map: time = "COLUMN", or time = { column = "COLUMN", unit = "ms" }.'
         )
 
     def _stamps(self, name: str, told: Channel | None) -> np.ndarray:
@@ -144,6 +150,8 @@ class TableLog(Log):
             stamps = stamps if told is None else apply(told, stamps)
         else:
             unit = (told and told.unit) or self._units[name]
+            if told is not None:
+                check_ending(what, told, unit, "s")
             stamps = self._values(name) if told is None else apply(told, self._values(name))
             stamps = convert(stamps, unit, "s", f"{self.path}: {name}") if is_unit(unit) else stamps
         if stamps.size == 0:
@@ -152,19 +160,24 @@ class TableLog(Log):
 
     def _cells(self, name: str) -> object:
         if self._heading[name] in self._twice:
-            raise InputError(f"{self.path}: several columns are named {self._heading[name]!r}; rename them.")
+            heading = self._heading[name]
+            own = [one for one in self._heading if one.startswith(f"{split_unit(heading)[0]} (column ")]
+            said = f"name one in a channel map: {', '.join(own)}" if own else "rename them"
+            raise InputError(f"{self.path}: several columns are named {heading!r}; {said}.")
         return self._load(self._heading[name])
 
     def _values(self, name: str) -> np.ndarray:
         return numeric(self._cells(name), f"{self.path}: column {name!r}", self._point)
 
 
-def split_unit(heading: str) -> tuple[str, str]:
-    """`yaw_rate [deg/s]` or `yaw_rate (deg/s)` as `("yaw_rate", "deg/s")`; a heading without a unit has the unit ""."""
-    match = _UNIT_IN_NAME.match(heading)
-    if match is None and (found := _UNIT_IN_ROUND.match(heading)) is not None and is_unit_name(found["unit"].strip()):
-        match = found
-    return (match["name"], match["unit"].strip()) if match else (heading.strip(), "")
+def check_ending(what: str, channel: Channel, unit: str | None, target: str) -> None:
+    """Raise `InputError` if nothing tells the unit of a column but its name, which ends with another one than `target`."""
+    ending = unit_of_ending(channel.column, target)
+    if not is_unit(unit) and channel.scale == 1.0 and ending not in ("", target):
+        raise InputError(
+            f"{what}: the name ends as if it were in {ending}, and no unit is given: it would count as {target}. "
+            f'Add unit = "{ending}" to it in the channel map, or unit = "{target}".'
+        )
 
 
 def apply(channel: Channel, values: np.ndarray) -> np.ndarray:

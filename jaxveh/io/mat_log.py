@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh.io.channel_map import Channel, ChannelMap
-from jaxveh.io.log import TIME_NAMES, apply
+from jaxveh.io.log import TIME_NAMES, apply, check_ending
 from jaxveh.io.mat_elements import Unread
 from jaxveh.io.mat_file import read_mat
 from jaxveh.io.naming import check_known
@@ -118,6 +118,7 @@ def _named_time(path: Path, content: Mapping[str, Any], named: Channel) -> tuple
 
 def _stamps(path: Path, named: Channel, values: np.ndarray) -> np.ndarray:
     """Convert times to seconds, with the unit of the channel map."""
+    check_ending(f"{path}: {named.column}", named, named.unit, "s")
     stamps = apply(named, values)
     return convert(stamps, named.unit, "s", f"{path}: {named.column}") if is_unit(named.unit) else stamps
 

@@ -1,12 +1,18 @@
-"""Messages about unknown names, with the nearest known names first."""
+"""Names of columns: with their units, and in messages about unknown ones, with the nearest first."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 from jaxveh._core.errors import InputError, near
+from jaxveh.io.units import is_unit_name
 
 _SHOWN = 30
+
+# `wheel[3]` is a name, `speed [km/h]` is a name and a unit; `speed (km/h)` too, but not `speed (GPS)`.
+_UNIT_IN_NAME = re.compile(r"^(?P<name>.*\S)\s*\[(?!\d+\])(?P<unit>[^\[\]]*)\]$")
+_UNIT_IN_ROUND = re.compile(r"^(?P<name>.*\S)\s*\((?!\d+\))(?P<unit>[^()]+)\)$")
 
 
 def listing(name: str, names: Iterable[str]) -> str:
@@ -28,3 +34,11 @@ def check_known(what: str, kind: str, name: str, names: Iterable[str], advice: s
     close = near(name, names)
     guess = f" (did you mean {close[0]!r}?)" if close else ""
     raise InputError(f"{what}: no {kind} {name!r}{guess}; {listing(name, names)}.{f' {advice}' if advice else ''}")
+
+
+def split_unit(heading: str) -> tuple[str, str]:
+    """`yaw_rate [deg/s]` or `yaw_rate (deg/s)` as `("yaw_rate", "deg/s")`; a heading without a unit has the unit ""."""
+    match = _UNIT_IN_NAME.match(heading)
+    if match is None and (found := _UNIT_IN_ROUND.match(heading)) is not None and is_unit_name(found["unit"].strip()):
+        match = found
+    return (match["name"], match["unit"].strip()) if match else (heading.strip(), "")

@@ -1,4 +1,4 @@
-"""Dates as countries write them, such as `01.03.2024 10:59:55,5` or `3/1/2024 10:59:55`, brought into the order of ISO 8601."""
+"""Dates as countries write them, such as `01.03.2024 10:59:55,5` or `1-Mar-2024 10:59:55`, in the order of ISO 8601."""
 
 from __future__ import annotations
 
@@ -11,14 +11,18 @@ from jaxveh.io.toml import shorten
 _CLOCK = r"[T ]\s*(?P<hour>\d\d?)(?P<rest>:\d\d(:\d\d([.,]\d+)?)?)\s*(?P<half>[AaPp][Mm])?\s*"
 _DAY_FIRST = re.compile(rf"\s*(?P<day>\d\d?)\.(?P<month>\d\d?)\.(?P<year>\d{{4}}){_CLOCK}")
 _YEAR_FIRST = re.compile(rf"\s*(?P<year>\d{{4}})[/.](?P<month>\d\d?)[/.](?P<day>\d\d?){_CLOCK}")
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_NAMED = re.compile(
+    rf"\s*(?P<day>\d\d?)[-/. ](?P<month>{'|'.join(_MONTHS)})[a-z]*\.?[-/. ](?P<year>\d{{4}}){_CLOCK}", re.IGNORECASE
+)
 _SLASHES = re.compile(rf"\s*(?P<one>\d\d?)/(?P<other>\d\d?)/(?P<year>\d{{4}}){_CLOCK}")
 
 
 def in_iso_order(texts: Sequence[str], what: str) -> list[str]:
     """Return texts with dates in the order of ISO 8601; other texts as they are, and all if the first that is not empty is none.
 
-    Dots have the day first. With slashes it is the day or the month, whichever no row of the column contradicts. The clock may
-    have twelve hours, with AM or PM.
+    Dots and names of months (English) have the day first. With slashes it is the day or the month, whichever no row of the column
+    contradicts. The clock may have twelve hours, with AM or PM.
 
     **Raises** `InputError` for slashes if no row tells which.
     """
@@ -40,14 +44,17 @@ def in_iso_order(texts: Sequence[str], what: str) -> list[str]:
 
 def is_national(text: str) -> bool:
     """Whether a text is a date and a time of day in one of these orders."""
-    return any(form.fullmatch(text) for form in (_DAY_FIRST, _YEAR_FIRST, _SLASHES))
+    return any(form.fullmatch(text) for form in (_DAY_FIRST, _YEAR_FIRST, _NAMED, _SLASHES))
 
 
 def _iso(text: str, first: str) -> str:
-    found = _DAY_FIRST.fullmatch(text) or _YEAR_FIRST.fullmatch(text) or _SLASHES.fullmatch(text)
+    forms = (_DAY_FIRST, _YEAR_FIRST, _NAMED, _SLASHES)
+    found = next((found for form in forms if (found := form.fullmatch(text)) is not None), None)
     if found is None:
         return text
     parts = found.groupdict()
+    if parts.get("month", "").casefold()[:3] in _MONTHS:
+        parts["month"] = str(1 + _MONTHS.index(parts["month"].casefold()))
     if first:
         one, other = parts["one"], parts["other"]
         parts["day"], parts["month"] = (one, other) if first == "day" else (other, one)

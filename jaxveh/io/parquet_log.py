@@ -11,7 +11,8 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh.io.channel_map import ChannelMap
-from jaxveh.io.log import TIME_NAMES, TableLog, split_unit
+from jaxveh.io.log import TIME_NAMES, TableLog
+from jaxveh.io.naming import split_unit
 from jaxveh.io.optional import require
 
 _INDEX = "__index_level_"

@@ -17,13 +17,15 @@ from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
 from jaxveh.io.csv_log import open_csv, write_csv
 from jaxveh.io.files import check_readable, check_suffix, replacing_file
-from jaxveh.io.log import Column, Log, apply
+from jaxveh.io.likely_names import likely_names
+from jaxveh.io.log import MOST_LIKELY, Column, Log, apply, check_ending
 from jaxveh.io.mat_log import open_mat
 from jaxveh.io.mcap_reader import open_mcap
 from jaxveh.io.mdf_log import open_mdf, write_mdf
 from jaxveh.io.merge import merge, resample
 from jaxveh.io.netcdf import open_netcdf, write_recording_netcdf
 from jaxveh.io.parquet_log import open_parquet, write_parquet
+from jaxveh.io.repeats import without_repeats
 from jaxveh.io.units import convert, is_unit
 from jaxveh.io.vbo import open_vbo
 
@@ -65,6 +67,21 @@ _ELSEWHERE = {
     ".trc": "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)",
     ".bag": "convert it to MCAP (`mcap convert`)",
     ".db3": "convert it to MCAP (`mcap convert`)",
+    ".log": "a table of text may end in .txt; CAN frames are decoded with their DBC file into MDF4 (asammdf)",
+    ".can": "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)",
+    ".ibt": "export it as CSV, with its units",
+    ".erg": "export it as CSV or MATLAB from CarMaker's IPGControl",
+    ".vs": "export it as CSV or MATLAB from CarSim's plotter",
+    ".erd": "export it as CSV or MATLAB from CarSim's plotter",
+    ".tdms": "load its channels and make a `jaxveh.Recording`, or write Parquet",
+    ".json": "write its arrays as CSV or Parquet",
+    ".npy": "load its arrays and make a `jaxveh.Recording`",
+    ".npz": "load its arrays and make a `jaxveh.Recording`",
+    ".gz": "unpack it first",
+    ".zip": "unpack it first",
+    ".xdrk": "export it as CSV from AiM's Race Studio",
+    ".mlg": "export it as CSV from MegaLogViewer",
+    ".llg": "export it as CSV from Link's PCLink",
     ".feather": "save it as Parquet (`pandas.read_feather`, then `to_parquet`)",
     ".pkl": "save it as Parquet (`to_parquet`)",
     ".h5": "load its arrays and make a `jaxveh.Recording`, or write MATLAB 7.3, NetCDF or Parquet",
@@ -146,7 +163,7 @@ def _read(
         if not loaded:
             raise InputError(f"{path}: has no channel except time.")
         note = log.note if as_saved else log.note or path.name
-    time, values = merge(loaded)
+    time, values = _joined(path, *merge(loaded))
     if as_saved:
         # A recording leaves arrays of JAX unchanged; those of NumPy get JAX's current float type.
         values = {name: jnp.asarray(one) for name, one in values.items()}
@@ -155,7 +172,24 @@ def _read(
         recording = Recording(time, values, units, note)
         return recording if raster is None else resample(recording, raster, method)
     except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+        told = chosen is not None and chosen.time is not None
+        others = [] if told or np.all(np.diff(time) > 0) else likely_names("time", log.names)[:MOST_LIKELY]
+        other = f' Or is {", ".join(others)} the time? Name it in a channel map: time = "COLUMN".' if others else ""
+        raise InputError(f"{path}: {error}{other}") from error
+
+
+def _joined(path: Path, time: np.ndarray, values: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Join rows with the same time stamp, with a warning, where none contradicts another."""
+    repeats = int(np.sum(np.diff(time) == 0))
+    joined = without_repeats(time, values) if repeats else None
+    if joined is None:
+        return time, values
+    warnings.warn(
+        f"{path}: {repeats} rows have the time of the row before and no other values: joined with it.",
+        JaxvehWarning,
+        stacklevel=3,
+    )
+    return joined
 
 
 def write_recording(recording: Recording, path: str | os.PathLike, *, overwrite: bool = False) -> None:
@@ -230,4 +264,5 @@ def _load(log: Log, name: str, channel: Channel) -> Column:
     what = f"{log.path}: {name}" + (f" (column {channel.column!r})" if channel.column != name else "")
     if target is None:
         return Column(column.time, values, unit if is_unit(unit) else "")
+    check_ending(what, channel, unit, target)
     return Column(column.time, convert(values, unit, target, what) if is_unit(unit) else values, target)

@@ -14,7 +14,8 @@ from jaxveh._core.errors import InputError, check_one_of, path_of
 from jaxveh._core.names import as_several
 from jaxveh.io.csv_log import read_columns
 from jaxveh.io.files import check_readable, check_suffix
-from jaxveh.io.log import numeric, split_unit
+from jaxveh.io.log import numeric
+from jaxveh.io.naming import split_unit
 from jaxveh.io.rig_axes import AXES, to_ours
 from jaxveh.io.rig_shown import RigShown
 from jaxveh.io.ttc import SUFFIXES as TTC_SUFFIXES

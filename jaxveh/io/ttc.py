@@ -22,9 +22,9 @@ from jaxveh._core.errors import InputError, JaxvehWarning, path_of
 from jaxveh.io.csv_log import read_below
 from jaxveh.io.decimals import is_number
 from jaxveh.io.files import check_readable
-from jaxveh.io.log import numeric, split_unit
+from jaxveh.io.log import numeric
 from jaxveh.io.mat_file import read_mat
-from jaxveh.io.naming import listing
+from jaxveh.io.naming import listing, split_unit
 
 SUFFIXES = (".dat", ".txt", ".mat")
 """Endings of files that are read as the consortium's; a `.csv` is too if it has the consortium's names."""

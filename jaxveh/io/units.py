@@ -21,6 +21,7 @@ _ALIASES_FOR = {
     # An angle has no dimension, so that 1/s is a valid name for rad/s; hertz and per cent are not.
     "rad/s": {"1/s": "rad/s", "s^-1": "rad/s", "1/min": "rpm", "min^-1": "rpm", "rev/min": "rpm"},
     "rad": {"1": "rad"},
+    "s": {"unix time": "s", "Unix time": "s", "epoch": "s"},
 }
 _IN_ANY_CASE = {
     "km/h": ("km/h", "kmh", "kph", "kmph", "km/hr"), "mph": ("mph",), "deg": ("deg", "degree", "degrees"),

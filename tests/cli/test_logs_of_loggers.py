@@ -42,6 +42,32 @@ def test_check_tells_of_names_that_look_like_known_ones(tmp_path):
         assert f"the name of this channel is {known}." in " ".join(result.stdout.split())
 
 
+def test_names_of_others_are_proposed_for_what_is_not_there(tmp_path):
+    """`check` says which column may be which channel, and what needs the channel says it too."""
+    path = logger_file(tmp_path, names="Time,Ground Speed,Gyro Z,G Force Lat,Steered Angle")
+    checked = " ".join(run("check", path).stdout.split())
+    meant = {"Ground Speed": "v_x", "Gyro Z": "yaw_rate", "G Force Lat": "a_y", "Steered Angle": "steer, or steering"}
+    for column, channel in meant.items():
+        assert f"warning {column} may be {channel}" in checked
+    line = error_line(run("estimate", path, "--vehicle", write_car(tmp_path), "-o", tmp_path / "o.csv"))
+    for column, channel in meant.items():
+        assert f"{column} may be {channel.split(',')[0]}" in line
+    (tmp_path / "map.toml").write_text("[channels]\n" + 'speed = "Ground Speed"\nsteering_wheel = "Steered Angle"\n')
+    checked = run("check", path, "--channels", tmp_path / "map.toml").stdout
+    assert "may be" not in checked
+
+
+@pytest.mark.parametrize("count", [1, 12])
+def test_names_of_any_length_leave_room_for_what_is_said_about_them(tmp_path, count):
+    table = columns()
+    table["v_x"][100] += 30.0
+    paths = [f"vehicle/dynamics/body/front/left/corner/{k}/sensor/filtered" for k in range(count)]
+    path = write_log(tmp_path, {**table, **{one: table["v_x"] for one in paths}})
+    words = run("check", path).stdout
+    assert words.count("1 spike(s), the largest") >= count
+    assert max(map(len, words.splitlines())) <= 200
+
+
 @pytest.mark.parametrize("unit", ["grad/s", "Grad/s", "GRAD/S"])
 def test_a_unit_that_is_not_sure_is_refused(tmp_path, unit):
     path = logger_file(tmp_path, names="time,v_x,yaw_rate,a_y,steer")

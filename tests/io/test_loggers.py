@@ -158,6 +158,8 @@ STAMPS = {
     "a comma": lambda at: at.strftime("%Y-%m-%d %H:%M:%S,%f")[:-3],
     "a date with dots": lambda at: at.strftime("%d.%m.%Y %H:%M:%S,%f"),
     "a short date with dots": lambda at: f"{at.day}.{at.month}.{at.year} {at.hour}:{at.strftime('%M:%S.%f')}",
+    "a month by name": lambda at: f"{at.day}-{at.strftime('%b-%Y %H:%M:%S.%f')}",
+    "a month by its long name": lambda at: at.strftime("%d %B %Y %H:%M:%S.%f"),
     "a date with slashes": lambda at: at.strftime("%Y/%m/%d %H:%M:%S.%f"),
     "a date with slashes and twelve hours": lambda at: at.strftime("%Y/%m/%d %I:%M:%S.%f %p"),
     "time of day": lambda at: at.strftime("%H:%M:%S.%f")[:-3],

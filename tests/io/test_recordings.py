@@ -119,7 +119,7 @@ BROKEN_CSV = {
         r"time\[2\] = 1.0 after time\[1\] = 2.0: must be strictly increasing",
     ),
     "time repeats": (
-        "time,v_x\n0,1\n1,1\n1,1\n",
+        "time,v_x\n0,1\n1,1\n1,2\n",
         r"time\[2\] = 1.0 after time\[1\] = 1.0: must be strictly increasing",
     ),
     "time missing in a row": ("time,v_x\n0,1\n,1\n", r"time is not finite in row 1"),

@@ -1,0 +1,160 @@
+"""Logs as other people's loggers write them: other names, units in names, lines below the names, names twice, rows twice."""
+
+import random
+import warnings
+
+import numpy as np
+import pytest
+
+from jaxveh import InputError, JaxvehWarning, io
+from jaxveh.io import kit, likely_names
+from jaxveh.io.canonical import CANONICAL
+
+NAMES = {
+    "v_x": "Ground Speed, Speed (OBD), vEgo, VehSpd, GPS_Speed, vx, speedKmh, VelForward, Fahrzeuggeschwindigkeit, v_mps",
+    "yaw_rate": "yawRate, Z_ANGLE_RATE, AngRateZ, gyro_z, imu_gz_rps, angular_velocity.z, omega, psi_dot, Gierrate, YawRt",
+    "a_y": "G Force Lat, LatAcc, lateral_acc, Y_ACCELERATION, linear_acceleration.y, ay, accel_y, Querbeschleunigung",
+    "a_x": "G Force Long, InlineAcc, longitudinal_acc, ax_mps2, LonAcc, Längsbeschleunigung, accx_can",
+    "steer": "Steered Angle, SteeringWheelAngle, steeringAngleDeg, delta, StrWhlAng, Lenkradwinkel, SWA, steer_deg",
+    "time": "t_s, Device Time, elapsed_time, write_millis, %time, __time, header.stamp.secs, Zeit, timestamp_us",
+}  # fmt: skip
+OTHERS = (
+    "Engine RPM, Wheel Speed FL, Steering Arm Force, Fan Speed, wind speed, deltadelta, targetLateralAcceleration, steerCommand, "
+    "Fuel Level, device_update_rate, a_y_std, gps_accuracy, imu_gy_rps, roll rate, Boost, distance, Steering Torque"
+)
+
+
+@pytest.mark.parametrize("channel", NAMES)
+def test_names_of_others_are_taken_for_the_channel_that_they_mean(channel):
+    everything = [name for names in NAMES.values() for name in names.split(", ")]
+    meant = NAMES[channel].split(", ")
+    assert kit.likely_names(channel, everything) == meant
+    assert kit.likely_names(channel, OTHERS.split(", ")) == []
+    assert kit.likely_names(channel, CANONICAL) == []
+
+
+ENDINGS = [
+    (quantity, unit, ending)
+    for quantity, units in likely_names._UNITS.items()
+    for unit, endings in units.items()
+    for ending in endings
+]
+
+
+@pytest.mark.parametrize("quantity", likely_names._UNITS)
+def test_a_unit_in_a_name_is_not_taken_for_si(tmp_path, quantity):
+    """A mapped column whose name ends with a unit other than SI needs the unit, a scale, or SI by word."""
+    path = tmp_path / "log.csv"
+    for unit, ending in [(unit, ending) for one, unit, ending in ENDINGS if one == quantity]:
+        column = f"sensor_{ending.replace(' ', '_')}"
+        for name in [name for name, known in CANONICAL.items() if known.unit == quantity and name != "time"] or [
+            "time"
+        ]:
+            path.write_text(f"clock,{column}\n0,1\n1,2\n" if name != "time" else f"{column},v\n0,1\n1,2\n")
+            read = lambda name=name, column=column, **told: io.read_recording(
+                path,
+                io.ChannelMap({"v": "v"}, time=io.Channel(column, **told))
+                if name == "time"
+                else io.ChannelMap({name: io.Channel(column, **told)}, time=io.Channel("clock")),
+            )
+            last = lambda log, name=name: float(log.time[1] if name == "time" else log[name][0])
+            if unit == quantity:
+                assert last(read()) == 1.0
+                continue
+            with pytest.raises(InputError, match=rf"ends as if it were in {unit}, and no unit .*Add unit = \"{unit}\""):
+                read()
+            assert last(read(unit=quantity)) == 1.0 == last(read(scale=0.5)) * 2.0
+            assert 0.0 < last(read(unit=unit)) != 1.0
+
+
+def table_of(draw, rows, heads, separator, decimal="."):
+    """Lines of a table of random numbers below its heads, and the numbers."""
+    values = np.round(draw.random() + np.arange(rows * len(heads[0])).reshape(rows, -1) * 0.125, 6)
+    values[:, 0] = 0.02 * np.arange(rows)
+    lines = [separator.join(head) for head in heads]
+    return lines + [separator.join(f"{cell:.6f}".replace(".", decimal) for cell in row) for row in values], values
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_line_of_sources_below_the_units_is_not_the_line_of_names(tmp_path, seed):
+    """Names, units, and a line in which cells are empty or alike."""
+    draw = random.Random(seed)
+    separator = draw.choice([",", ";", "\t"])
+    names = ["timestamp", "speed", "lateral_acc", "bearing", "rpm"]
+    units = [draw.choice(["unix time", "s", ""]), "km/h", "G", "deg", "rpm"]
+    sources = ["", *draw.choice([["100: gps"] * 4, ["gps", "gps", "calc", "obd"], ["", "gps", "", "can"]])]
+    lines, values = table_of(draw, 9, [names, units, sources], separator)
+    above = draw.choice([[], ["Logger 7", f"Driver{separator}A. N. Other", ""]])
+    (tmp_path / "log.csv").write_text("\n".join([*above, *lines]) + "\n")
+    with pytest.warns(JaxvehWarning, match=f"line {len(above) + 3} is not read"):
+        log = io.read_recording(tmp_path / "log.csv", io.ChannelMap({"speed": "speed", "a_y": "lateral_acc"}))
+    np.testing.assert_allclose(log["speed"], values[:, 1] / 3.6)
+    np.testing.assert_allclose(log["a_y"], values[:, 2] * 9.80665)
+    np.testing.assert_allclose(log.time, values[:, 0])
+
+
+@pytest.mark.parametrize("place", ["line", "brackets", "none"])
+def test_columns_of_one_name_are_told_apart_by_their_numbers(tmp_path, place):
+    draw = random.Random(place)
+    names = ["time", "speed", "gear", "speed", "speed"]
+    heads = {
+        "line": [names, ["s", "km/h", "-", "mph", "m/s"]],
+        "brackets": [["time [s]", "speed [km/h]", "gear", "speed [km/h]", "speed [m/s]"]],
+        "none": [names],
+    }[place]
+    lines, values = table_of(draw, 9, heads, ",")
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(InputError, match="'speed"):
+        io.read_recording(path)
+    factors = {"line": (1 / 3.6, 0.44704, 1.0), "brackets": (1 / 3.6, 1 / 3.6, 1.0), "none": (1.0, 1.0, 1.0)}[place]
+    for column, factor in zip((2, 4, 5), factors, strict=True):
+        named = "speed [m/s]" if place == "brackets" and column == 5 else f"speed (column {column})"
+        log = io.read_recording(path, io.ChannelMap({"v_x": named}))
+        np.testing.assert_allclose(log["v_x"], values[:, column - 1] * factor, err_msg=named)
+    with pytest.raises(
+        InputError, match=r"several columns are named 'speed.*'; name one .*: speed \(column 2\), speed"
+    ):
+        io.read_recording(path, io.ChannelMap({"v_x": "speed" if place != "brackets" else "speed [km/h]"}))
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("own", [False, True])
+def test_rows_with_one_time_are_joined_if_they_agree(tmp_path, seed, own):
+    """A row is written again, or in parts, each with the cells of one device."""
+    draw, path = random.Random(seed), tmp_path / "log.csv"
+    rows, lines, again = 20, [], 0
+    for k in range(rows):
+        cells = [f"{1.0 + k:g}", f"{0.5 * k:g}"]
+        parts = draw.choice(
+            [[cells], [cells], [cells, cells], [[cells[0], ""], ["", cells[1]]], [cells, [cells[0], ""]]]
+        )
+        lines += [f"{0.02 * k:.2f}," + ",".join(part) for part in parts]
+        again += len(parts) - 1
+    path.write_text("clock,a,b\n" + "\n".join(lines) + "\n")
+    channels = {"v_x": "a", "a_y": "b"}
+    told = (
+        io.ChannelMap({name: io.Channel(column, time=io.Channel("clock")) for name, column in channels.items()})
+        if own
+        else io.ChannelMap(channels, time=io.Channel("clock"))
+    )
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        log = io.read_recording(path, told)
+    assert any(f"{again} rows have the time of the row before" in str(one.message) for one in heard) == (not own)
+    np.testing.assert_allclose(log.time, 0.02 * np.arange(rows))
+    np.testing.assert_allclose(log["v_x"], 1.0 + np.arange(rows))
+    np.testing.assert_allclose(log["a_y"], 0.5 * np.arange(rows))
+    path.write_text(path.read_text() + f"{0.02 * (rows - 1):.2f},99,\n")
+    with pytest.raises(InputError, match="must be strictly increasing"):
+        io.read_recording(path, told)
+
+
+def test_a_time_that_stands_still_is_told_with_the_other_clocks(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("write_millis,time,v_x\n0,0,1\n20,0,2\n40,0,3\n")
+    with pytest.raises(InputError, match=r"Or is write_millis the time\? Name it in a channel map"):
+        io.read_recording(path)
+    path.write_text("write_millis,v_x\n0,1\n20,2\n")
+    with pytest.raises(InputError, match=r"no time column .*write_millis may be it\. .*unit = \"ms\""):
+        io.read_recording(path)
