@@ -14,6 +14,7 @@ from jaxveh._core.names import check_names
 from jaxveh._core.recording import gap_to_fill
 from jaxveh.diagnostics import kit
 from jaxveh.estimators import sideslip
+from jaxveh.io import kit as io
 
 SEEN = (*(need.channel for need in sideslip.needs), "steer")
 """Channels that the estimator may use; only a fit of the front axle uses the steer."""
@@ -35,9 +36,10 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
         check_positive("--fill", max_gap, "s")
     missing = [name for name in NEEDED if name not in recording]
     if missing:
+        likely = io.likely_words(missing, recording.names)
         raise InputError(
-            f"the log has no {', '.join(missing)}; it must have {', '.join(NEEDED)}. Map their columns with "
-            "--channels (jaxveh schema channels)."
+            f"the log has no {', '.join(missing)}; it must have {', '.join(NEEDED)}.{' ' if likely else ''}{likely} Map their "
+            "columns with --channels (jaxveh schema channels)."
         )
     for name in (*INPUTS, *(("steer",) if "steer" in recording else ())):
         recording = fill_short(recording, name, max_gap)

@@ -15,6 +15,7 @@ from jaxveh._core.progress import Progress
 from jaxveh.estimators import Calibration, sideslip
 from jaxveh.estimators import open_loop as drive_open_loop
 from jaxveh.io import CarSpecification
+from jaxveh.io import kit as io
 
 NAME = sideslip.NAME
 
@@ -60,7 +61,8 @@ def read_calibration(path: Path, car: CarSpecification | None) -> Calibration:
 def why_not_calibrated(part: Recording) -> str | None:
     """Return why a log cannot calibrate itself; None if it can."""
     if "a_y" not in part or not np.isfinite(np.asarray(part["a_y"])).any():
-        return "the log has no a_y"
+        likely = io.likely_words(["a_y"], part.names).removesuffix(".")
+        return "the log has no a_y" + (f" ({likely})" if likely else "")
     length = float(part.time[-1] - part.time[0])
     return None if length >= sideslip.SHORTEST else f"{length:.3g} s are too short ({sideslip.SHORTEST:g} s are needed)"
 

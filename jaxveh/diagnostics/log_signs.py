@@ -80,8 +80,8 @@ def check_signs(log: LogView) -> list[LogFinding]:
 
 def _refuted(finding: LogFinding) -> LogFinding:
     """A finding that v_x is in another unit, of a log in which the wheels say that it is not."""
-    name, story = finding.message.partition(":")[0].split(" ", 1)
-    message = f"{story}, but the wheels confirm v_x: was it planned, not measured, or is its scale wrong?"
+    name, story, *_ = finding.message.removeprefix("disagrees with ").split(", ")
+    message = f"{story.removeprefix('which ')}, but the wheels confirm v_x: was it planned, not measured, or is its scale wrong?"
     return finding._replace(severity="warning", channel=name, message=message)
 
 
@@ -234,7 +234,8 @@ def _slope(name: str, other: str, line: tuple[float, float, float], table: dict,
     if factors and abs(intercept) < SHIFTED:
         nearest = min(factors, key=lambda factor: abs(np.log(slope / factor)))
         channel, unit = factors[nearest]
-        story = story if channel == name else f"{name} {story}"
+        if channel != name:
+            story = f"disagrees with {name}, which {story}, unless that is planned, not measured"
         return LogFinding("error", channel, f"{story}: {channel} looks like {unit}. Set it in the channel map.", values)
     return LogFinding(
         "warning", name, f"{story}, which should be 1: a wrong unit or scale, or a car that slides?", values

@@ -39,8 +39,8 @@ from jaxveh.io import CarSpecification
 from jaxveh.io import kit as io
 from jaxveh.statespace import StateSpace
 
-MOST_NAMED, MOST_LIKELY = 30, 3
-"""The number of channels that a message lists, and of those that it proposes for one that is missing."""
+MOST_NAMED = 30
+"""The number of channels that a message lists."""
 
 
 class Need(NamedTuple):
@@ -66,14 +66,11 @@ def check_needs(who: str, needs: tuple[Need, ...], recording: Recording, model: 
     if missing:
         verb = "is" if len(missing) == 1 else "are"
         measured = [name for name in recording.names if not name.startswith("true.")]
-        alike = {
-            need.channel: io.likely_names(need.channel, measured) for need in wanted if need.channel not in recording
-        }
-        likely = [f"{', '.join(names[:MOST_LIKELY])} may be {channel}" for channel, names in alike.items() if names]
+        likely = io.likely_words([need.channel for need in wanted if need.channel not in recording], measured)
         raise InputError(
             f"{who}: {', '.join(missing)} {verb} missing from the log; it has: "
-            f"{io.in_words(measured, MOST_NAMED) if measured else 'no channel'}. "
-            f"{'; '.join([*likely, ''])}{'n' if likely else 'N'}ame the columns in a channel map, or in the recording."
+            f"{io.in_words(measured, MOST_NAMED) if measured else 'no channel'}.{' ' if likely else ''}{likely} "
+            "Name the columns in a channel map, or in the recording."
         )
     for need in wanted:
         unit = recording.unit(need.channel)

@@ -3,7 +3,7 @@
 from jaxveh.io.car import CAR_SCHEMA, STEERINGS, car_lines, car_of_toml
 from jaxveh.io.channel_map import CHANNEL_MAP_SCHEMA
 from jaxveh.io.datasets import dataset_of, frame_of, of_dataset
-from jaxveh.io.likely_names import likely_names
+from jaxveh.io.likely_names import likely_names, likely_words
 from jaxveh.io.mcap_log import MCAP_SUFFIX
 from jaxveh.io.naming import check_known
 from jaxveh.io.nested_log import in_words
@@ -36,6 +36,7 @@ __all__ = [
     "in_words",
     "is_unit",
     "likely_names",
+    "likely_words",
     "load_result",
     "of_dataset",
     "parse_property_file",

@@ -7,6 +7,9 @@ from collections.abc import Iterable
 
 from jaxveh.io.canonical import CANONICAL, canonical_unit
 
+MOST = 3
+"""The number of names that a message proposes for one channel."""
+
 _ACCELERATION = r"(acc\w*|beschl\w*|g force|g)"
 _OF = lambda axis, letter: (
     rf"\b{axis} ?{_ACCELERATION}\b|\b{_ACCELERATION} ?{axis}\b|\b{axis}\w*beschl\w*|\b(acc\w*|a) ?{letter}\b|\b{letter} acc\w*\b"
@@ -66,6 +69,12 @@ def likely_names(channel: str, names: Iterable[str]) -> list[str]:
     of = lambda name: _without_unit(words_of(name), canonical_unit(channel) or "")
     fits = lambda words: re.search(_LIKELY[channel], words) is not None and re.search(unlike, words) is None
     return [name for name in names if name not in CANONICAL and fits(of(name))]
+
+
+def likely_words(missing: Iterable[str], names: Iterable[str]) -> str:
+    """Return a sentence for a message, which proposes `names` for known channels that are missing; "" if none looks like one."""
+    alike = {channel: likely_names(channel, names)[:MOST] for channel in missing}
+    return " ".join(f"{', '.join(found)} may be {channel}." for channel, found in alike.items() if found)
 
 
 def unit_of_ending(name: str, quantity: str) -> str:

@@ -14,7 +14,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap
 from jaxveh.io.decimals import decimal
-from jaxveh.io.likely_names import likely_names, unit_of_ending
+from jaxveh.io.likely_names import MOST, likely_names, unit_of_ending
 from jaxveh.io.naming import check_known, listing, split_unit
 from jaxveh.io.repeats import without_repeats
 from jaxveh.io.stamps import seconds
@@ -23,9 +23,6 @@ from jaxveh.io.units import convert, is_unit
 
 TIME_NAMES = ("time", "timestamps", "timestamp", "t")
 """Names by which a time column is found, in this order and in any case."""
-
-MOST_LIKELY = 3
-"""The number of columns that a message proposes."""
 
 _SWAP = str.maketrans(",.", ".,")
 
@@ -134,7 +131,7 @@ class TableLog(Log):
                 if name in self._heading and name.casefold() == wanted:
                     return name
         alike = likely_names("time", self._heading)
-        first = f" {', '.join(alike[:MOST_LIKELY])} may be it." if alike else ""
+        first = f" {', '.join(alike[:MOST])} may be it." if alike else ""
         raise InputError(
             f"{self.path}: no time column ({', '.join(TIME_NAMES)}); {listing('time', self._heading)}.{first} "
             'Name it in a channel map: time = "COLUMN", or time = { column = "COLUMN", unit = "ms" }.'

@@ -17,8 +17,8 @@ from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
 from jaxveh.io.csv_log import open_csv, write_csv
 from jaxveh.io.files import check_readable, check_suffix, replacing_file
-from jaxveh.io.likely_names import likely_names
-from jaxveh.io.log import MOST_LIKELY, Column, Log, apply, check_ending
+from jaxveh.io.likely_names import MOST, likely_names
+from jaxveh.io.log import Column, Log, apply, check_ending
 from jaxveh.io.mat_log import open_mat
 from jaxveh.io.mcap_reader import open_mcap
 from jaxveh.io.mdf_log import open_mdf, write_mdf
@@ -173,7 +173,7 @@ def _read(
         return recording if raster is None else resample(recording, raster, method)
     except InputError as error:
         told = chosen is not None and chosen.time is not None
-        others = [] if told or np.all(np.diff(time) > 0) else likely_names("time", log.names)[:MOST_LIKELY]
+        others = [] if told or np.all(np.diff(time) > 0) else likely_names("time", log.names)[:MOST]
         other = f' Or is {", ".join(others)} the time? Name it in a channel map: time = "COLUMN".' if others else ""
         raise InputError(f"{path}: {error}{other}") from error
 

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from programs import columns, error_line, run, write_car, write_log
 
+from jaxveh import InputError, estimators, io
+
 ABOVE = {"nothing": "", "lines above": "Logger 7\nDriver,A. N. Other\n\n", "comments": "# logger 7\n"}
 
 
@@ -50,8 +52,9 @@ def test_names_of_others_are_proposed_for_what_is_not_there(tmp_path):
     for column, channel in meant.items():
         assert f"warning {column} may be {channel}" in checked
     line = error_line(run("estimate", path, "--vehicle", write_car(tmp_path), "-o", tmp_path / "o.csv"))
-    for column, channel in meant.items():
-        assert f"{column} may be {channel.split(',')[0]}" in line
+    assert "Ground Speed may be v_x. Gyro Z may be yaw_rate. Map their columns with --channels" in line
+    with pytest.raises(InputError, match=r"it has: Ground Speed, .*\. Ground Speed may be v_x\. Name the columns"):
+        estimators.kit.check_needs("mass", (estimators.kit.Need("v_x", "m/s"),), io.read_recording(path))
     (tmp_path / "map.toml").write_text("[channels]\n" + 'speed = "Ground Speed"\nsteering_wheel = "Steered Angle"\n')
     checked = run("check", path, "--channels", tmp_path / "map.toml").stdout
     assert "may be" not in checked
@@ -60,9 +63,10 @@ def test_names_of_others_are_proposed_for_what_is_not_there(tmp_path):
 @pytest.mark.parametrize("count", [1, 12])
 def test_names_of_any_length_leave_room_for_what_is_said_about_them(tmp_path, count):
     table = columns()
+    table["v_x"] = 20.0 + np.sin(table["time"])
     table["v_x"][100] += 30.0
     paths = [f"vehicle/dynamics/body/front/left/corner/{k}/sensor/filtered" for k in range(count)]
-    path = write_log(tmp_path, {**table, **{one: table["v_x"] for one in paths}})
+    path = write_log(tmp_path, {**table, **dict.fromkeys(paths, table["v_x"])})
     words = run("check", path).stdout
     assert words.count("1 spike(s), the largest") >= count
     assert max(map(len, words.splitlines())) <= 200
