@@ -54,7 +54,8 @@ class NestedLog(Log):
 
 
 def in_words(names: Mapping[str, str] | Sequence[str], most: int = 12) -> str:
-    """List names in words, with the description of each if `names` is a mapping; a long list is cut, with a count of the rest."""
+    """List names in words, with the description of each if `names` is a mapping; after `most` of them the list is cut, with a
+    count of the rest."""
     words = [f"{name} ({what})" for name, what in names.items()] if isinstance(names, Mapping) else list(names)
     more = f", and {len(words) - most} more" if len(words) > most else ""
     return ", ".join(words[:most]) + more if words else "nothing"
