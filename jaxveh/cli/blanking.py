@@ -16,7 +16,10 @@ from jaxveh.diagnostics import kit
 from jaxveh.estimators import sideslip
 from jaxveh.io import kit as io
 
-SEEN = (*(need.channel for need in sideslip.needs), "steer")
+READ = tuple(need.channel for need in sideslip.needs)
+"""Channels that the estimate reads."""
+
+SEEN = (*READ, "steer")
 """Channels that the estimator may use; only a fit of the front axle uses the steer."""
 
 NEEDED = tuple(need.channel for need in sideslip.needs if not need.optional)

@@ -13,7 +13,7 @@ from rich.text import Text
 from jaxveh import Recording, diagnostics, io
 from jaxveh.cli import options
 from jaxveh.cli.console import results
-from jaxveh.cli.drives import COLOURS
+from jaxveh.cli.log_errors import COLOURS
 from jaxveh.cli.output import check_report, make_folder, write_numbers
 from jaxveh.cli.vehicle import car_of
 from jaxveh.diagnostics import kit

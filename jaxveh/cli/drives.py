@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from rich.text import Text
-
 from jaxveh import InputError, Recording, diagnostics, estimators, io
 from jaxveh.cli import options
-from jaxveh.cli.blanking import SEEN, fill_gaps
+from jaxveh.cli.blanking import fill_gaps
 from jaxveh.cli.console import results
-from jaxveh.cli.missing_speed import with_speed
+from jaxveh.cli.log_errors import check_trusted, tell
+from jaxveh.cli.missing_speed import sources_of_speed, with_speed
+from jaxveh.cli.several_logs import SeveralLogs
 from jaxveh.io import CarSpecification
-
-COLOURS = {"error": "bold red", "warning": "yellow", "note": "cyan", "ok": "green"}
-
 
 BRIDGED = 0.1
 """Longest gap that resampling fills, s."""
@@ -38,49 +34,33 @@ class Drive(NamedTuple):
     findings: Sequence[diagnostics.LogFinding] = ()
 
 
-@contextmanager
-def names_log(log: Path, logs: Sequence[Path]) -> Iterator[None]:
-    """Begin the messages of errors about one of several `logs` with its name, unless they name it."""
-    try:
-        yield
-    except InputError as error:
-        if len(logs) == 1 or log.name in str(error):
-            raise
-        raise InputError(f"{log}: {error}") from error
-
-
-def with_channel(drive: Drive, name: str, source: str, logs: Sequence[Path]) -> Drive:
-    """Return one of several `logs` with its channel `source` in the place of the channel `name`."""
-    with names_log(drive.log, logs):
-        return drive._replace(recording=drive.recording.replace(**{name: drive.recording[source]}))
-
-
 def read_drives(
-    logs: list[Path],
+    several: SeveralLogs,
     car: CarSpecification,
     channels: Path | None,
     fill: float | None,
     span: str | None,
-    used: tuple[str | None, ...],
+    used: Collection[str],
     anyway: bool,
-) -> list[Drive]:
-    """Read the logs, cut each to its span, fill gaps of inputs on request, and check each.
+) -> dict[Path, Drive]:
+    """Read the logs, cut each to its span, fill gaps of inputs on request, and check each; without those that are refused.
 
-    The warnings of `check` are printed. **Raises** `InputError` for a file that is named twice (a fit to it would seem surer than
-    it is), and if `check` finds errors in channels that are `used`, or that an estimator uses, unless `anyway` is set.
+    The warnings of `check` are printed. A log is refused if `check` finds errors in channels that are `used`, unless `anyway` is
+    set. **Raises** `InputError` for a file that is named twice (a fit to it would seem surer than it is).
     """
-    files = [log.resolve() for log in logs]
-    if twice := [log for log, file in zip(logs, files, strict=True) if files.count(file) > 1]:
+    files = [log.resolve() for log in several.logs]
+    if twice := [log for log, file in zip(several.logs, files, strict=True) if files.count(file) > 1]:
         raise InputError(f"{twice[1]}: the log is named twice; name each log once.")
-    drives = []
-    for log in logs:
-        with names_log(log, logs):
-            recording = with_speed(log, _on_one_clock(log, _read(log, car, channels, span)), car)
-            recording = fill_gaps(recording, fill)
-        findings = _look_at(log, recording, car, {*SEEN, "time", *(name for name in used if name)}, anyway)
-        drives.append(Drive(log, recording, findings))
+
+    def read(log: Path) -> Drive:
+        measured = _on_one_clock(log, _read(log, car, channels, span))
+        recording = fill_gaps(with_speed(log, measured, car), fill)
+        reads = {*used, *sources_of_speed(measured, car)}
+        return Drive(log, recording, _look_at(log, recording, car, reads, reads, anyway))
+
+    drives = several.each(read, {log: log for log in several.logs})
     if not anyway:
-        _check_one_car(drives)
+        _check_one_car(list(drives.values()))
     return drives
 
 
@@ -89,15 +69,17 @@ def read_log(
     car: CarSpecification,
     channels: Path | None,
     span: str | None,
-    used: tuple[str | None, ...],
+    truth: str | None,
+    reads: Callable[[Recording], Collection[str]],
     anyway: bool,
 ) -> Drive:
-    """Read one log, cut it to its span, and check it; it needs no channels except those that are `used`.
+    """Read one log, cut it to its span, and check it; errors in channels that something `reads` are printed as such.
 
-    **Raises** `InputError` if `check` finds errors in the time or in a used channel, unless `anyway` is set.
+    **Raises** `InputError` if `check` finds errors in the time or in the `truth`, unless `anyway` is set.
     """
     recording = _read(log, car, channels, span)
-    return Drive(log, recording, _look_at(log, recording, car, {"time", *(name for name in used if name)}, anyway))
+    used = () if truth is None else (truth,)
+    return Drive(log, recording, _look_at(log, recording, car, used, {*used, *reads(recording)}, anyway))
 
 
 def _read(log: Path, car: CarSpecification, channels: Path | None, span: str | None) -> Recording:
@@ -140,20 +122,10 @@ def _check_one_car(drives: Sequence[Drive]) -> None:
 
 
 def _look_at(
-    log: Path, recording: Recording, car: CarSpecification, used: set[str], anyway: bool
+    log: Path, recording: Recording, car: CarSpecification, used: Collection[str], read: Collection[str], anyway: bool
 ) -> Sequence[diagnostics.LogFinding]:
     findings = diagnostics.check_log(recording, car=car)
-    told = [finding for finding in findings if finding.severity in ("error", "warning")]
-    for severity in ("error", "warning"):
-        for finding in told:
-            if finding.severity == severity:
-                line = Text.assemble((severity, COLOURS[severity]), f" {log.name}: {finding.channel} {finding.message}")
-                results().print(line, soft_wrap=True)
-    errors = [finding for finding in told if finding.severity == "error" and used & set(finding.channel.split(", "))]
-    if errors and not anyway:
-        first = errors[0]
-        more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-        raise InputError(
-            f"{log}: {first.channel} {first.message}{more} `jaxveh check` shows all findings; --anyway uses the log unchanged."
-        )
+    tell(log, findings, read)
+    if not anyway:
+        check_trusted(log, findings, used)
     return findings

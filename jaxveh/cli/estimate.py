@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -14,12 +14,14 @@ from jaxveh import InputError, Recording, io
 from jaxveh._core.errors import check_at_least, check_one_of
 from jaxveh._core.recording import TRUTH as SIMULATED
 from jaxveh.cli import options, quantities, quantity_options, sideslip
-from jaxveh.cli.blanking import LogParts, split
-from jaxveh.cli.console import number, progress, results, spread, table
-from jaxveh.cli.drives import Drive, names_log, read_drives, with_channel
+from jaxveh.cli.blanking import READ, LogParts, split
+from jaxveh.cli.calibration_words import say_source, source_in_words
+from jaxveh.cli.console import number, progress, results, table
+from jaxveh.cli.drives import Drive, read_drives
 from jaxveh.cli.estimate_figures import draw
 from jaxveh.cli.estimate_report import check_report_page, reported_log, write_report
 from jaxveh.cli.output import check_product, check_products, check_report, write_numbers
+from jaxveh.cli.several_logs import SeveralLogs
 from jaxveh.cli.vehicle import car_of
 from jaxveh.diagnostics import kit
 
@@ -115,7 +117,8 @@ def estimate(
     the rows after it are estimated; --calibration uses a file that jaxveh fit has written; --as-told uses the values of the car
     file. The output file has a column for each state and, beside it, <name>_std, its standard deviation: m/s, rad, rad/s.
 
-    First of all the log is checked, as by jaxveh check; the program ends if there are errors (--anyway continues).
+    First of all the log is checked, as by jaxveh check: errors in channels that the quantity reads stop it (--anyway continues),
+    others are notes. If one of several logs is refused, the others are estimated, and the program ends with an error.
 
     The car file is TOML in SI units with mass, yaw_inertia, front_axle_to_cg, rear_axle_to_cg and, for each axle, its
     cornering stiffness or Magic Formula coefficients: see [bold]jaxveh schema car[/].
@@ -144,14 +147,18 @@ def estimate(
 
 def _estimate_sideslip(choice: Choice, numbers: Path | None) -> None:
     check_report(choice.out, numbers)
-    fitted, estimates = _estimate(choice)
-    shown = estimates[choice.logs[0].name] if len(choice.logs) == 1 else {"logs": estimates}
+    several = SeveralLogs(choice.logs)
+    fitted, estimates = _estimate(choice, several)
+    several.check_some()
+    shown = {"logs": estimates, "refused": several.reasons()}
     configuration = {
         name: value
         for name, value in choice._asdict().items()
         if name not in ("product", "seed", "out", "report", "force")
     }
+    shown = shown if len(choice.logs) > 1 else next(iter(estimates.values()))
     write_numbers(numbers, {**sideslip.fitted_parameters(fitted), **shown}, configuration, choice.seed)
+    several.conclude()
 
 
 class Choice(NamedTuple):
@@ -178,37 +185,54 @@ class Choice(NamedTuple):
     live: bool
 
 
-def _estimate(choice: Choice) -> tuple[Any, dict[str, Any]]:
+def _estimate(choice: Choice, several: SeveralLogs) -> tuple[Any, dict[str, Any]]:
     """Return the calibration (None if the values of the car file are used), and the numbers of each log by its name."""
     products = _check(choice)
     told = None if choice.vehicle is None else car_of(choice.vehicle)
     found = None if choice.calibration is None else sideslip.read_calibration(choice.calibration, told)
     car = _car(told, found)
-    used = (choice.truth, *choice.calibrate_on)
-    drives = read_drives(choice.logs, car, choice.channels, choice.fill, choice.span, used, choice.anyway)
-    choice, drives = _with_simulated_truth(choice, drives)
-    jobs = [_job(choice, car, drive, product) for drive, product in zip(drives, products, strict=True)]
-    fitted_on = [job.parts.estimate if job.parts.calibration is None else job.parts.calibration for job in jobs]
-    reason = "--as-told" if choice.as_told else None
-    if found is None and reason is None and choice.calibrate is None:
-        reason = next((why for part in fitted_on if (why := sideslip.why_not_calibrated(part))), None)
+    # The open-loop baseline of a score is driven by the steer.
+    used = {*READ, *choice.calibrate_on, *((choice.truth, "steer") if choice.truth else ())}
+    drives = read_drives(several, car, choice.channels, choice.fill, choice.span, used, choice.anyway)
+    choice, drives = _with_simulated_truth(choice, drives, several)
+    jobs = several.each(lambda drive: _job(choice, car, drive, products[drive.log]), drives)
+    several.check_some()
+    fitted_on, reason = ({}, None) if found else _fitted_on(choice, jobs)
     with progress("estimate") as report:
-        if found is None and reason is None:
-            found = sideslip.calibrate(car, fitted_on, choice.calibrate_on, report)
-            found = found.with_log_names(*(log.name for log in choice.logs))
+        if fitted_on:
+            found = sideslip.calibrate(car, list(fitted_on.values()), choice.calibrate_on, report)
+            found = found.with_log_names(*(log.name for log in fitted_on))
         report(0, 1, "estimating (compiling first)")
         how = (choice.filter.value, choice.particles, choice.seed, not choice.live)
-        estimates = [sideslip.estimate(found or car, job.parts.estimate, *how) for job in jobs]
+        estimates = several.each(lambda job: sideslip.estimate(found or car, job.parts.estimate, *how), jobs)
         report(1, 1, "scoring")
-    _say_source(choice, found, reason)
-    numbers = [_conclude(choice, job, one, found, car) for job, one in zip(jobs, estimates, strict=True)]
-    if choice.report is not None:
-        _report(choice, jobs, estimates, numbers, found, car, _source_in_words(choice, found, reason))
-    return found, {job.drive.log.name: one for job, one in zip(jobs, numbers, strict=True)}
+    say_source(choice, found, reason, len(fitted_on))
+    pairs = {log: (jobs[log], one) for log, one in estimates.items()}
+    numbers = several.each(lambda pair: _conclude(choice, *pair, found, car), pairs)
+    if choice.report is not None and numbers:
+        source = source_in_words(choice, found, reason, len(fitted_on))
+        _report(choice, several, [(*pairs[log], one) for log, one in numbers.items()], found, car, source)
+    return found, {log.name: one for log, one in numbers.items()}
 
 
-def _check(choice: Choice) -> list[Path]:
-    """Return the files of the estimates; raise `InputError` if options conflict, or a file could not be written."""
+def _fitted_on(choice: Choice, jobs: Mapping[Path, Job]) -> tuple[dict[Path, Recording], str | None]:
+    """Return the parts of the logs that a calibration is fitted to, or none and the reason; print which logs are left out."""
+    if choice.as_told:
+        return {}, "--as-told"
+    if choice.calibrate is not None:
+        return {log: job.parts.calibration for log, job in jobs.items() if job.parts.calibration is not None}, None
+    why = {log: sideslip.why_not_calibrated(job.parts.estimate) for log, job in jobs.items()}
+    usable = {log: jobs[log].parts.estimate for log, reason in why.items() if reason is None}
+    if not usable:
+        return {}, next(iter(why.values()))
+    for log, reason in why.items():
+        if reason is not None:
+            results().print(f"note: the calibration leaves {log.name} out: {reason}.", markup=False, soft_wrap=True)
+    return usable, None
+
+
+def _check(choice: Choice) -> dict[Path, Path]:
+    """Return the files of the estimates by log; raise `InputError` if options conflict, or a file could not be written."""
     logs, product = choice.logs, choice.product
     sources = (*logs, choice.vehicle, choice.channels, choice.calibration)
     if len(logs) == 1:
@@ -230,19 +254,22 @@ def _check(choice: Choice) -> list[Path]:
         raise InputError(f"--calibration contains all fitted values: leave out {other} or --calibration.")
     if choice.calibrate is not None and len(logs) > 1:
         raise InputError("--calibrate takes one log: calibrate with `jaxveh fit`, and give its file as --calibration.")
-    return products
+    return dict(zip(logs, products, strict=True))
 
 
-def _with_simulated_truth(choice: Choice, drives: Sequence[Drive]) -> tuple[Choice, list[Drive]]:
+def _with_simulated_truth(
+    choice: Choice, drives: dict[Path, Drive], several: SeveralLogs
+) -> tuple[Choice, dict[Path, Drive]]:
     """In a simulated log put `true.v_y` in the place of a measured v_y, so that it is scored in the same way."""
     if choice.truth is None or not choice.truth.startswith(SIMULATED):
-        return choice, list(drives)
+        return choice, drives
     name = choice.truth.removeprefix(SIMULATED)
     if name in choice.calibrate_on:
         raise InputError(
             f"--truth {choice.truth}: --calibrate-on uses {name}: take --truth {name}, or leave --calibrate-on out."
         )
-    return choice._replace(truth=name), [with_channel(one, name, choice.truth, choice.logs) for one in drives]
+    moved = lambda one: one._replace(recording=one.recording.replace(**{name: one.recording[choice.truth]}))
+    return choice._replace(truth=name), several.each(moved, drives)
 
 
 def _job(choice: Choice, car: io.CarSpecification, drive: Drive, product: Path) -> Job:
@@ -252,9 +279,8 @@ def _job(choice: Choice, car: io.CarSpecification, drive: Drive, product: Path) 
             f"-o {product}: time stamps must be at least zero, but the log begins at {time[0]:.15g} s: write another format."
         )
     span = options.span_of(choice.calibrate, float(time[0]), float(time[-1]))
-    with names_log(drive.log, choice.logs):
-        parts = split(drive.recording, span, choice.calibrate_on, choice.truth)
-        sideslip.check_truth(car, parts.truth, choice.truth)
+    parts = split(drive.recording, span, choice.calibrate_on, choice.truth)
+    sideslip.check_truth(car, parts.truth, choice.truth)
     out = choice.out if choice.out is None or len(choice.logs) == 1 else choice.out / drive.log.stem
     return Job(drive, parts, span, product, out)
 
@@ -265,39 +291,6 @@ def _car(told: io.CarSpecification | None, calibration: Any) -> io.CarSpecificat
     if told is None:
         raise InputError("--vehicle is missing: give the car's file (jaxveh schema car), or a --calibration.")
     return told
-
-
-def print_fitted(calibration: Any) -> None:
-    """Print the fitted parameters as a table."""
-    rows = [
-        (name, spread(one["value"], one["std"]), one["unit"])
-        for name, one in sideslip.fitted_parameters(calibration)["fitted"].items()
-    ]
-    table("Fitted", ("parameter", "value ± std", "unit"), rows)
-    if (words := sideslip.untold_in_words(calibration)) is not None:
-        results().print(words)
-
-
-def _say_source(choice: Choice, calibration: Any, reason: str | None) -> None:
-    if calibration is None or choice.calibrate is None:
-        results().print(_source_in_words(choice, calibration, reason), markup=False)
-    if calibration is None or choice.calibration is not None:
-        return
-    print_fitted(calibration)
-    if (words := sideslip.reference_in_words(calibration, choice.calibrate_on)) is not None:
-        results().print(words)
-
-
-def _source_in_words(choice: Choice, calibration: Any, reason: str | None) -> str:
-    if calibration is None:
-        return f"Nothing was calibrated, the values of the car file are used: {reason}."
-    spans = "; ".join(f"{one.log or 'a log'} {kit.shown_time(one.start, one.end)} s" for one in calibration.spans)
-    if choice.calibration is not None:
-        return f"Calibrated by {choice.calibration}, on {spans}."
-    if choice.calibrate is not None:
-        return f"Calibrated on {spans}."
-    one = "The log calibrated itself, on all its", "The logs calibrated themselves together, on all their"
-    return f"{one[len(choice.logs) > 1]} rows and without a reference."
 
 
 def _conclude(choice: Choice, job: Job, found: Any, calibration: Any, car: io.CarSpecification) -> dict[str, Any]:
@@ -332,18 +325,21 @@ def _write(choice: Choice, job: Job, found: Any, car: io.CarSpecification) -> No
 
 
 def _report(
-    choice: Choice, jobs: list[Job], estimates: list, numbers: list[dict[str, Any]], calibration: Any,
+    choice: Choice, several: SeveralLogs, done: Sequence[tuple[Job, Any, dict]], calibration: Any,
     car: io.CarSpecification, source: str,
 ) -> None:  # fmt: skip
-    """Write the page of all logs."""
+    """Write the page of all logs that are `done`."""
     assert choice.report is not None
     logs = [
         reported_log(
             job.drive, found, job.parts.truth, choice.truth, None if choice.truth is None else shown, car, calibration
         )
-        for job, found, shown in zip(jobs, estimates, numbers, strict=True)
+        for job, found, shown in done
     ]
-    facts = {"car file": choice.vehicle, "truth": choice.truth, "filter": choice.filter.value, "span": choice.span}
-    drives = [job.drive for job in jobs]
+    facts = {
+        "car file": choice.vehicle, "truth": choice.truth, "filter": choice.filter.value, "span": choice.span,
+        "no estimate of": " ".join(several.reasons().values()) or None,
+    }  # fmt: skip
+    drives = [job.drive for job, _, _ in done]
     write_report(choice.report, logs, drives, car, calibration, source, facts, overwrite=choice.force)
     results().print(f"report: {choice.report}", markup=False)

@@ -14,8 +14,9 @@ import jaxveh
 from jaxveh import InputError, Recording, io
 from jaxveh.cli import sideslip
 from jaxveh.cli.console import number, spread
-from jaxveh.cli.drives import COLOURS, Drive
+from jaxveh.cli.drives import Drive
 from jaxveh.cli.estimate_figures import beside
+from jaxveh.cli.log_errors import COLOURS
 from jaxveh.cli.output import check_product
 from jaxveh.diagnostics import kit
 

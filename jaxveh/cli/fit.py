@@ -7,13 +7,14 @@ from typing import Annotated, Any
 
 import typer
 
-from jaxveh import InputError, Recording, estimators, io
+from jaxveh import InputError, estimators, io
 from jaxveh.cli import options, sideslip
-from jaxveh.cli.blanking import calibration_part
+from jaxveh.cli.blanking import READ, calibration_part
+from jaxveh.cli.calibration_words import print_fitted
 from jaxveh.cli.console import progress, results
-from jaxveh.cli.drives import Drive, names_log, read_drives
-from jaxveh.cli.estimate import print_fitted
+from jaxveh.cli.drives import Drive, read_drives
 from jaxveh.cli.output import check_folders, check_product, check_report, make_folder, write_numbers
+from jaxveh.cli.several_logs import SeveralLogs
 from jaxveh.cli.vehicle import car_of
 from jaxveh.diagnostics import kit
 
@@ -61,12 +62,15 @@ def fit(
     check_report(out, numbers)
     check_folders(out, logs)
     car, uses = car_of(vehicle), tuple(calibrate_on or ())
-    drives = read_drives(logs, car, channels, fill, span, uses, anyway)
+    used, several = {*READ, *uses, *(("steer",) if car_file or out else ())}, SeveralLogs(logs)
+    read = read_drives(several, car, channels, fill, span, used, anyway)
+    parts = list(several.each(lambda drive: calibration_part(drive.recording, uses), read).values())
+    several.check_all()
+    drives = list(read.values())
     if out is not None and any("steer" not in drive.recording for drive in drives):
         raise InputError(
             "--out: the force curves need steer, which is missing from the log. Map its column, or leave --out out."
         )
-    parts = [_part(drive, uses, logs) for drive in drives]
     with progress("fit") as report:
         calibration = sideslip.calibrate(car, parts, uses, report).with_log_names(*(log.name for log in logs))
     estimators.write_calibration(calibration, product, overwrite=force)
@@ -82,11 +86,6 @@ def fit(
     }  # fmt: skip
     shown = {"file": product, "car_file": car_file, "figures": figures}
     write_numbers(numbers, {**sideslip.fitted_parameters(calibration), **shown}, configuration, None)
-
-
-def _part(drive: Drive, uses: tuple[str, ...], logs: list[Path]) -> Recording:
-    with names_log(drive.log, logs):
-        return calibration_part(drive.recording, uses)
 
 
 def _write_car(

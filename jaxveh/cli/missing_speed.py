@@ -30,6 +30,17 @@ def with_speed(log: Path, recording: Recording, car: CarSpecification) -> Record
     return recording
 
 
+def sources_of_speed(recording: Recording, car: CarSpecification) -> set[str]:
+    """Return the channels of a log from which `with_speed` finds its `v_x`; none if it is measured."""
+    speed = estimators.speed
+    if "v_x" in recording:
+        return set()
+    if has_wheels(recording):
+        needs = speed.METHODS[speed.RECOMMENDED].make(car).needs
+        return {need.channel for need in needs if need.channel in recording}
+    return {"speed"} & set(recording.names)
+
+
 def has_wheels(recording: Recording) -> bool:
     """Whether a log has wheel speeds."""
     return any(name.startswith("wheel_speed_") for name in recording.names)

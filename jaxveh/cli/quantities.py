@@ -14,16 +14,16 @@ from jaxveh._core.errors import check_one_of, check_positive
 from jaxveh._core.recording import TRUTH
 from jaxveh.cli.blanking import fill_short, with_fill_option
 from jaxveh.cli.console import number, progress, results, spread, table
-from jaxveh.cli.drives import names_log, read_log
+from jaxveh.cli.drives import read_log
+from jaxveh.cli.log_errors import check_trusted, read_by
 from jaxveh.cli.missing_speed import has_wheels, wants_v_x, with_speed
 from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
-from jaxveh.cli.quantity_options import QUANTITIES, USUAL_FILTER, USUAL_PARTICLES, inputs_of
+from jaxveh.cli.quantity_options import QUANTITIES, USUAL_FILTER, USUAL_PARTICLES, inputs_of, methods_of, names_of
+from jaxveh.cli.several_logs import SeveralLogs
 from jaxveh.cli.vehicle import car_of
+from jaxveh.diagnostics import LogFinding
 from jaxveh.estimators import Answers, Compared, MethodScore
 from jaxveh.io import CarSpecification
-
-ALL = "all"
-"""In `--what`: each quantity that the log has channels for, by its recommended method; in `--methods`: all methods."""
 
 NOTHING = "nothing done"
 
@@ -51,6 +51,15 @@ class Asked(NamedTuple):
     live: bool
 
 
+class Told(NamedTuple):
+    """A log: what the methods may have `seen` of it, the whole `recording`, and the findings of its check."""
+
+    log: Path
+    seen: Recording
+    recording: Recording
+    findings: Sequence[LogFinding]
+
+
 class Shown(NamedTuple):
     """The result for one quantity and one log: the compared methods, and their scores by method and name.
 
@@ -60,17 +69,6 @@ class Shown(NamedTuple):
     compared: Compared
     scores: dict[str, dict[str, MethodScore]]
     nothing: dict[str, float]
-
-
-def names_of(text: str, option: str, known: Sequence[str]) -> tuple[str, ...]:
-    """Split an option's value at commas into names without repetition; `all` stands for all known names.
-
-    **Raises** `InputError` for an unknown name.
-    """
-    names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
-    for name in names:
-        check_one_of(option, name, (*known, ALL))
-    return tuple(known) if ALL in names else names
 
 
 def quantities_asked(choice: Any, what: str, methods: str | None) -> Asked | None:
@@ -96,41 +94,32 @@ def quantities_asked(choice: Any, what: str, methods: str | None) -> Asked | Non
     )  # fmt: skip
 
 
-def methods_of(text: str | None, what: tuple[str, ...]) -> tuple[str, ...] | None:
-    """Return the methods of `--methods`; None for the recommended ones.
-
-    **Raises** `InputError` for several quantities, or for a name that is no method of the quantity.
-    """
-    if text is None:
-        return None
-    quantity, *others = what
-    if others:
-        raise InputError(f"--methods applies to one quantity: name one with --what, not {', '.join(what)}.")
-    return names_of(text, f"--methods of {quantity}", tuple(QUANTITIES[quantity].METHODS))
-
-
 def estimate_quantities(asked: Asked, numbers: Path | None) -> None:
     """Estimate the requested quantities along each log, then print, draw and write the results."""
     check_report(asked.out, numbers)
     products, car = _check(asked)
-    found: dict[str, Any] = {}
+    several = SeveralLogs(asked.logs)
+    told = several.each(lambda log: _log(asked, log, car), {log: log for log in asked.logs})
     with progress("estimate") as report:
-        told = [_log(asked, log, car) for log in asked.logs]
-        shown = []
-        for k, (log, (seen, recording)) in enumerate(zip(asked.logs, told, strict=True)):
-            report(k, len(told), f"estimating along {log.name} (compiling first)")
-            with names_log(log, asked.logs):
-                own = _logs(asked, log, seen, car)
-                shown.append({name: _one(asked, QUANTITIES[name], car, own[name], recording) for name in asked.what})
-    for log, product, (_, recording), one in zip(asked.logs, products, told, shown, strict=True):
-        found[log.name] = _conclude(asked, log, product, recording, one)
-    content = found[asked.logs[0].name] if len(asked.logs) == 1 else {"logs": found}
+
+        def work(one: Told) -> dict[str, Shown]:
+            report(asked.logs.index(one.log), len(asked.logs), f"estimating along {one.log.name} (compiling first)")
+            own = _logs(asked, one, car)
+            return {name: _one(asked, QUANTITIES[name], car, own[name], one) for name in asked.what}
+
+        shown = several.each(work, told)
+    pairs = {log: (told[log], products[log], one) for log, one in shown.items()}
+    found = several.each(lambda pair: _conclude(asked, *pair), pairs)
+    several.check_some()
+    by_name = {log.name: one for log, one in found.items()}
+    content = {"logs": by_name, "refused": several.reasons()} if len(asked.logs) > 1 else next(iter(by_name.values()))
     configuration = {name: value for name, value in asked._asdict().items() if name not in ("product", "out", "force")}
     write_numbers(numbers, content, configuration, None)
+    several.conclude()
 
 
-def _check(asked: Asked) -> tuple[list[Path], CarSpecification]:
-    """Return the files to write, and the car; raise `InputError` if a file could not be written, or options conflict."""
+def _check(asked: Asked) -> tuple[dict[Path, Path], CarSpecification]:
+    """Return the files to write by log, and the car; raise `InputError` if a file could not be written, or options conflict."""
     sources = (*asked.logs, asked.vehicle, asked.channels)
     if asked.vehicle is None:
         raise InputError("--vehicle is missing: give the car's file (jaxveh schema car).")
@@ -141,24 +130,32 @@ def _check(asked: Asked) -> tuple[list[Path], CarSpecification]:
         check_one_of("--truth", asked.truth.removeprefix(TRUTH), sorted(shown))
     if len(asked.logs) == 1:
         check_product(asked.product, io.SUFFIXES, asked.force, sources)
-        return [asked.product], car_of(asked.vehicle)
+        return {asked.logs[0]: asked.product}, car_of(asked.vehicle)
     products = [asked.product / f"{log.stem}.parquet" for log in asked.logs]
     check_products(asked.product, products, asked.force, sources)
-    return products, car_of(asked.vehicle)
+    return dict(zip(asked.logs, products, strict=True)), car_of(asked.vehicle)
 
 
-def _log(asked: Asked, log: Path, car: CarSpecification) -> tuple[Recording, Recording]:
-    """Return the part of a log that the methods may use, and the whole log."""
-    drive = read_log(log, car, asked.channels, asked.span, (asked.truth,), asked.anyway)
+def _log(asked: Asked, log: Path, car: CarSpecification) -> Told:
+    """Read a log, and hide its truth and the channels that reveal it from the methods."""
+
+    def reads(recording: Recording) -> set[str]:
+        every = {name: asked.methods or (QUANTITIES[name].RECOMMENDED,) for name in asked.what}
+        return {
+            one for q, names in every.items() for name in names for one in read_by(QUANTITIES[q], name, car, recording)
+        }
+
+    drive = read_log(log, car, asked.channels, asked.span, asked.truth, reads, asked.anyway)
     recording = drive.recording
-    if asked.truth is None:
-        return _filled(asked, recording, car), recording
-    if asked.truth not in recording:
-        raise InputError(
-            f"--truth {asked.truth}: {log.name} has no such channel; it has: {', '.join(recording.names)}."
-        )
-    hidden = {asked.truth, *ALIKE.get(asked.truth.removeprefix(TRUTH), (asked.truth.removeprefix(TRUTH),))}
-    return _filled(asked, recording.without(*[name for name in recording.names if name in hidden]), car), recording
+    hidden = set()
+    if asked.truth is not None:
+        if asked.truth not in recording:
+            raise InputError(
+                f"--truth {asked.truth}: {log.name} has no such channel; it has: {', '.join(recording.names)}."
+            )
+        hidden = {asked.truth, *ALIKE.get(asked.truth.removeprefix(TRUTH), (asked.truth.removeprefix(TRUTH),))}
+    seen = _filled(asked, recording.without(*[name for name in recording.names if name in hidden]), car)
+    return Told(log, seen, recording, drive.findings)
 
 
 def _filled(asked: Asked, recording: Recording, car: CarSpecification) -> Recording:
@@ -169,56 +166,59 @@ def _filled(asked: Asked, recording: Recording, car: CarSpecification) -> Record
     return recording
 
 
-def _logs(asked: Asked, log: Path, seen: Recording, car: CarSpecification) -> dict[str, Recording]:
+def _logs(asked: Asked, told: Told, car: CarSpecification) -> dict[str, Recording]:
     """Return the log that each quantity sees: with `v_x` from the wheels, except for the speed itself; from the speed over
     ground only for methods that do not use that, too, as a measurement of its own."""
+    seen = told.seen
     wants = lambda quantity: wants_v_x(quantity, asked.methods or (quantity.RECOMMENDED,), car)
     wanting = {name for name in asked.what if name != SPEED and (has_wheels(seen) or wants(QUANTITIES[name]))}
-    driven = _filled(asked, with_speed(log, seen, car), car) if wanting else seen
+    driven = _filled(asked, with_speed(told.log, seen, car), car) if wanting else seen
     return {name: driven if name in wanting else seen for name in asked.what}
 
 
-def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, seen: Recording, recording: Recording) -> Shown:
-    """Estimate one quantity along one log.
+def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, own: Recording, told: Told) -> Shown:
+    """Estimate one quantity along one log, of which it sees `own`.
 
-    With several quantities, one that the log does not allow is listed as refused; a single quantity raises.
+    Of several quantities or all methods, those that the log does not allow are listed as refused; others raise.
     """
-    if asked.methods is None and len(asked.what) > 1:
-        compared = _recommended(quantity, car, seen, not asked.live)
-    else:
-        every = asked.methods is not None and set(asked.methods) == set(quantity.METHODS)
-        methods = None if every else asked.methods or [quantity.RECOMMENDED]
-        compared = _compared(quantity, car, seen, methods, not asked.live)
+    compared = _compared(asked, quantity, car, own, told)
     if asked.truth is None or asked.truth.removeprefix(TRUTH) not in quantity.SHOWN:
         return Shown(compared, {}, {})
     name = asked.truth.removeprefix(TRUTH)
-    truth = np.asarray(recording[asked.truth], float)
+    truth = np.asarray(told.recording[asked.truth], float)
     scores = {method: {name: estimators.score_answers(one, name, truth)} for method, one in compared.answers.items()}
-    guess = np.asarray(quantity.do_nothing(car, seen)[name], float)
+    guess = np.asarray(quantity.do_nothing(car, own)[name], float)
     there = np.isfinite(truth) & np.isfinite(guess)
     nothing = {name: float(np.sqrt(np.mean((guess - truth)[there] ** 2)))} if there.any() else {}
     return Shown(compared, scores, nothing)
 
 
-def _recommended(quantity: ModuleType, car: CarSpecification, seen: Recording, smoothed: bool) -> Compared:
-    """Run the recommended method, or record the reason why it cannot run."""
-    try:
-        return _compared(quantity, car, seen, [quantity.RECOMMENDED], smoothed)
-    except InputError as error:
-        return Compared({}, {quantity.RECOMMENDED: str(error)}, {})
+def _compared(asked: Asked, quantity: ModuleType, car: CarSpecification, own: Recording, told: Told) -> Compared:
+    """Run the methods that are asked for, each where the log's check found no error in a channel that it reads; reasons of
+    refusals name the option that helps."""
+    methods = asked.methods or (quantity.RECOMMENDED,)
+    go_on = len(asked.what) > 1 if asked.methods is None else set(methods) == set(quantity.METHODS)
+    found = Compared({}, {}, {})
+    for name in methods:
+        try:
+            if not asked.anyway:
+                check_trusted(told.log, told.findings, read_by(quantity, name, car, told.seen))
+            one = estimators.compare(car, own, quantity, [name], smoothed=not asked.live)
+        except InputError as error:
+            reason = with_fill_option(str(error))
+            if not go_on:
+                raise InputError(reason) from error
+            found.refused[name] = reason
+            continue
+        found.answers.update(one.answers)
+        found.microseconds.update(one.microseconds)
+        found = found._replace(smoothed=found.smoothed + one.smoothed)
+    return found
 
 
-def _compared(quantity: ModuleType, car: CarSpecification, seen: Recording, methods: Any, smoothed: bool) -> Compared:
-    """Run the methods (None: all); reasons of refusals name the option that helps."""
-    try:
-        found = estimators.compare(car, seen, quantity, methods, smoothed=smoothed)
-    except InputError as error:
-        raise InputError(with_fill_option(str(error))) from error
-    return found._replace(refused={name: with_fill_option(reason) for name, reason in found.refused.items()})
-
-
-def _conclude(asked: Asked, log: Path, product: Path, recording: Recording, found: dict[str, Shown]) -> dict[str, Any]:
+def _conclude(asked: Asked, told: Told, product: Path, found: dict[str, Shown]) -> dict[str, Any]:
     """Print, write and draw the results for one log; return its numbers for the JSON file."""
+    log, recording = told.log, told.recording
     _print(log, found)
     answers = {
         (quantity, method): one for quantity, shown in found.items() for method, one in shown.compared.answers.items()

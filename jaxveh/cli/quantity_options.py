@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from jaxveh import InputError, estimators
+from jaxveh._core.errors import check_one_of
 from jaxveh.cli.console import table
 from jaxveh.io import CarSpecification
 
@@ -23,6 +24,9 @@ QUANTITIES: dict[str, ModuleType] = {
 USUAL_FILTER, USUAL_PARTICLES = "ekf", 1000
 """Defaults of the sideslip program; the methods of the other quantities choose their own filters."""
 
+ALL = "all"
+"""In `--what`: each quantity that the log has channels for, by its recommended method; in `--methods`: all methods."""
+
 FILLED = ("steer", "v_x", "a_x")
 """Channels that `--fill` fills for every quantity; for a method also those that it needs in every row."""
 
@@ -35,6 +39,30 @@ def inputs_of(what: Sequence[str], methods: Sequence[str] | None, car: CarSpecif
             with contextlib.suppress(InputError):  # a car without a method's numbers is told of by the method
                 found |= {need.channel for need in quantity.METHODS[name].make(car).needs if need.throughout}
     return tuple(sorted(found))
+
+
+def names_of(text: str, option: str, known: Sequence[str]) -> tuple[str, ...]:
+    """Split an option's value at commas into names without repetition; `all` stands for all known names.
+
+    **Raises** `InputError` for an unknown name.
+    """
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
+    for name in names:
+        check_one_of(option, name, (*known, ALL))
+    return tuple(known) if ALL in names else names
+
+
+def methods_of(text: str | None, what: tuple[str, ...]) -> tuple[str, ...] | None:
+    """Return the methods of `--methods`; None for the recommended ones.
+
+    **Raises** `InputError` for several quantities, or for a name that is no method of the quantity.
+    """
+    if text is None:
+        return None
+    quantity, *others = what
+    if others:
+        raise InputError(f"--methods applies to one quantity: name one with --what, not {', '.join(what)}.")
+    return names_of(text, f"--methods of {quantity}", tuple(QUANTITIES[quantity].METHODS))
 
 
 What = Annotated[

@@ -27,12 +27,19 @@ LAGGING = 2.0
 
 
 class LogFinding(NamedTuple):
-    """One finding: its `severity` (of `SEVERITIES`), the `channel` concerned, a `message` in words, `values` by name."""
+    """One finding: its `severity` (of `SEVERITIES`), the `channel` concerned, a `message` in words, `values` by name; `instead`:
+    other channels, one of which may be the wrong one."""
 
     severity: str
     channel: str
     message: str
     values: dict[str, float]
+    instead: tuple[str, ...] = ()
+
+    @property
+    def suspects(self) -> set[str]:
+        """The channels of which one or all may be wrong."""
+        return {*self.channel.split(", "), *self.instead}
 
 
 def shown_time(seconds: float, end: float | None = None) -> str:

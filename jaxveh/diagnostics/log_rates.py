@@ -46,8 +46,10 @@ def _compare(log: LogView, name: str, rate: str) -> list[LogFinding]:
     if name in OVER_GROUND and not log.is_slow(log.even(rate)):
         return [LogFinding("note", name, f"{story}: its turns are too quick to tell of signs and units.", values)]
     if slope < 0:
-        advice = _CLOCKWISE if rate == "yaw_rate" else "Set sign = -1 in the channel map."
-        return [LogFinding("error", name, f"{story}: one of the two has the wrong sign. {advice}", values)]
+        turns = rate == "yaw_rate"
+        advice = _CLOCKWISE if turns else "Set sign = -1 in the channel map."
+        instead = () if turns else (rate,)  # a yaw rate is compared with the lateral acceleration
+        return [LogFinding("error", name, f"{story}: one of the two has the wrong sign. {advice}", values, instead)]
     if is_one(slope):
         return [LogFinding("ok", name, f"{story}.", values)]
     if correlation < SCALED:

@@ -153,11 +153,12 @@ def _steering(correlation: float, gently: float, lateral: tuple[float, float, fl
     agrees = lateral is not None and lateral[2] > AGREE and lateral[0] > 0
     opposed = lateral is not None and lateral[2] > AGREE and lateral[0] < 0
     wrong = "steer" if agrees else "yaw_rate" if opposed else "steer or yaw_rate"
+    channel, _, instead = wrong.partition(" or ")
     message = (
         f"steer and yaw_rate are opposite (correlation {correlation:.2f}): {wrong} has the wrong sign. Left is "
         "positive; set sign = -1 in the channel map."
     )
-    return LogFinding("error", "steer" if wrong == "steer or yaw_rate" else wrong, message, values)
+    return LogFinding("error", channel, message, values, (instead,) if instead else ())
 
 
 def _slides(line: tuple[float, float, float], gently: tuple[float, float, float]) -> LogFinding | None:
@@ -220,9 +221,9 @@ def _slope(name: str, other: str, line: tuple[float, float, float], table: dict,
         )
         return LogFinding("note", name, message, values)
     if slope < 0:
-        return LogFinding(
-            "error", name, f"{story}: {blamed} has the wrong sign. Set sign = -1 in the channel map.", values
-        )
+        instead = tuple(one for one in blamed.split(" or ") if one != name)
+        message = f"{story}: {blamed} has the wrong sign. Set sign = -1 in the channel map."
+        return LogFinding("error", name, message, values, instead)
     if is_one(slope):
         if abs(intercept) > 0.5:
             return LogFinding("warning", name, f"{story}: a bias of {intercept:.2g} m/s^2, or a banked road.", values)

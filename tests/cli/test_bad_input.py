@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from programs import CAR, columns, error_line, run, write_car, write_log
 
-from jaxveh import InputError, estimators, io, studies, tyres
+from jaxveh import FilterError, InputError, estimators, io, studies, tyres
+from jaxveh.cli import sideslip
 
 
 def estimate(folder, *more, log=None, car=None):
@@ -256,27 +257,80 @@ BAD_AMONG_GOOD = {
 }
 
 
+def called(program, logs, car):
+    return run(program[0], *logs, "--vehicle", car, *program[1:])
+
+
 @pytest.mark.parametrize("fault", BAD_AMONG_GOOD)
 @pytest.mark.parametrize(
     "program",
     [
         ("fit", "-o", "out.toml", "--calibrate-on", "v_y"),
-        ("estimate", "-o", "out", "--truth", "v_y"),
-        ("estimate", "-o", "out", "--truth", "v_y", "--what", "sideslip", "--methods", "rear_axle"),
+        ("estimate", "-o", "out", "--truth", "v_y", "--json", "out.json"),
+        (
+            "estimate",
+            "-o",
+            "out",
+            "--truth",
+            "v_y",
+            "--json",
+            "out.json",
+            "--what",
+            "sideslip",
+            "--methods",
+            "rear_axle",
+        ),
     ],
     ids=["fit", "sideslip", "quantity"],
 )
-def test_a_bad_log_among_good_ones_is_named_before_any_work(fault, program, tmp_path, monkeypatch):
-    """A fit does not look at the speed of a reference; of the other quantities many need no yaw rate and no motion."""
-    if (fault == "parked" and program[0] == "fit") or (fault in ("parked", "a dead sensor") and "--what" in program):
+def test_a_bad_log_among_good_ones_is_named_and_the_others_are_estimated(fault, program, tmp_path, monkeypatch):
+    """A fit, which is one of all logs, is refused before any work. It does not look at the speed of a reference; of the other
+    quantities many need no motion."""
+    if fault == "parked" and (program[0] == "fit" or "--what" in program):
         pytest.skip("the program does not refuse it")
     bad = write_log(tmp_path, BAD_AMONG_GOOD[fault]).rename(tmp_path / "bad.csv")
     good, car = write_log(tmp_path), write_car(tmp_path)
     monkeypatch.chdir(tmp_path)
-    # Quantities are estimated log by log: the bad one is refused first.
-    logs = (bad, good) if "--what" in program else (good, bad)
-    result = run(program[0], *logs, "--vehicle", car, *program[1:])
+    result = called(program, (bad, good), car)
     line = result.stderr.strip().splitlines()[-1]
     assert result.exit_code == 2 and line.startswith("error: "), result.output
     assert "bad.csv" in line and "drive.csv" not in line.replace(str(tmp_path), "")
-    assert not list(tmp_path.rglob("*.parquet")) and not (tmp_path / "out.toml").exists()
+    if program[0] == "fit":
+        assert not (tmp_path / "out.toml").exists()
+        return
+    assert "no estimate of 1 of 2 logs; the others are written" in line
+    assert [path.name for path in tmp_path.rglob("*.parquet")] == ["drive.parquet"]
+    numbers = json.loads((tmp_path / "out.json").read_text())
+    assert list(numbers["logs"]) == ["drive.csv"] and numbers["refused"]["bad.csv"] in line
+    expected = (tmp_path / "out" / "drive.parquet").read_bytes()
+    alone = ("estimate", "-o", "alone.parquet", *program[3:])
+    assert called(alone, (good,), car).exit_code == 0
+    assert (tmp_path / "alone.parquet").read_bytes() == expected
+
+
+@pytest.mark.parametrize("program", ["fit", "estimate", "estimate --what"])
+def test_every_bad_log_is_named_at_once(program, tmp_path):
+    name, (product, *more) = program.partition(" ")[0], PROGRAMS_OF_SEVERAL_LOGS[program]
+    logs = [write_log(tmp_path, columns(2)).rename(tmp_path / f"bad_{k}.csv") for k in range(3)]
+    line = error_line(called((name, "-o", tmp_path / product, *more), logs, write_car(tmp_path)))
+    assert all(log.name in line for log in logs) and "the others" not in line
+    assert not list(tmp_path.rglob("*.parquet"))
+
+
+def test_a_filter_that_fails_along_one_log_leaves_the_others(tmp_path, monkeypatch):
+    """Its exit code is that of a failure; with a log of bad input beside it, that of the input."""
+    names = ("good", "failing", "later")
+    logs = [write_log(tmp_path).rename(tmp_path / f"{name}.csv") for name in names]
+    estimate_one, count = sideslip.estimate, []
+
+    def failing(*given):
+        count.append(given)
+        if len(count) == 2:
+            raise FilterError("step 3: lost")
+        return estimate_one(*given)
+
+    monkeypatch.setattr(sideslip, "estimate", failing)
+    result = called(("estimate", "-o", tmp_path / "out", "--as-told"), logs, write_car(tmp_path))
+    line = result.stderr.strip().splitlines()[-1]
+    assert result.exit_code == 1 and "failing.csv: step 3: lost" in line, result.output
+    assert sorted(path.stem for path in (tmp_path / "out").iterdir()) == ["good", "later"]

@@ -10,8 +10,7 @@ import pytest
 from programs import error_line, run
 
 from jaxveh import Recording, estimators, io
-from jaxveh.cli.quantities import names_of
-from jaxveh.cli.quantity_options import QUANTITIES
+from jaxveh.cli.quantity_options import QUANTITIES, names_of
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "estimators"))
 import method_logs
