@@ -16,10 +16,10 @@ from jaxveh.manoeuvres.driver import AbstractDriver, Motion, driver_state
 from jaxveh.manoeuvres.paths import AbstractPath
 from jaxveh.manoeuvres.speeds import AbstractSpeed
 from jaxveh.numerics import smooth_clip
-from jaxveh.vehicles import regularised_speed
+from jaxveh.vehicles import kit, regularised_speed
 
 _CRAWL = 1.0
-"""Below this speed (m/s) course and curvature are regularised, so that standstill is an ordinary point."""
+"""Below this speed (m/s; less for small cars) course and curvature are regularised, so that standstill is an ordinary point."""
 
 
 class PathDriver(AbstractDriver):
@@ -86,19 +86,23 @@ class PathDriver(AbstractDriver):
 
     def derivatives(self, t: Any, motion: Motion, state: Any) -> Any:
         curvature, needed = self._arc(motion)
-        now = motion.yaw_rate / regularised_speed(motion.v_x, _CRAWL)
+        now = motion.yaw_rate / regularised_speed(motion.v_x, self._crawl)
         wish = self._limit(state.steer + self.gain * needed * (curvature - now))
         rate = (wish - state.steer) / self.reaction_lag
         return driver_state(self.state_names)(smooth_clip(rate, -self.rate_limit, self.rate_limit, self.rate_limit / 8))
 
     def _arc(self, motion: Motion) -> tuple[jax.Array, jax.Array]:
         """The curvature of the arc to the point ahead (1/m), and the steer per curvature in steady state (rad m)."""
-        course = motion.yaw + numerics.arctan2(motion.v_y, regularised_speed(motion.v_x, _CRAWL))
+        course = motion.yaw + numerics.arctan2(motion.v_y, regularised_speed(motion.v_x, self._crawl))
         distance = numerics.hypot(self.preview_time * motion.v_x, self.shortest_preview)
         target = self.path.preview(motion.x, motion.y, course, distance)
         square = target.ahead * target.ahead + target.left * target.left
         curvature = 2.0 * target.left / numerics.or_one(square, square > 0)
         return curvature, self.wheelbase + self.understeer_gradient * motion.v_x * motion.v_x
+
+    @property
+    def _crawl(self) -> jax.Array:
+        return _CRAWL * kit.small_size(self.wheelbase)
 
     def _limit(self, steer: jax.Array) -> jax.Array:
         return smooth_clip(steer, -self.steer_limit, self.steer_limit, self.steer_limit / 8)

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.names import record
 from jaxveh._core.parameter import positive
 from jaxveh.manoeuvres.base import AbstractManoeuvre, PedalInputs
@@ -38,7 +38,9 @@ class SpeedControl(AbstractDriver):
     m/s^2 of zero both are positive, for a smooth transition). The pedals of the wrapped driver are added.
 
     **Parameters**: `mass` (kg), `wheel_radius` (m), `gain` (1/s), `integral_time` (s), `drag_area` (m^2: drag
-    coefficient times area), `rolling_resistance` (-), `drive_limit` and `brake_limit` (m/s^2).
+    coefficient times area), `rolling_resistance` (-), `drive_limit` and `brake_limit` (m/s^2). By default the gain is 1/s and the
+    integral time 4 s; for a car with a `wheelbase` (m) of less than 2 m, these times are shorter by the root of the wheelbase
+    over 2 m (Froude's law).
 
     **States**: those of the driver, and `speed_integral` (m/s^2).
 
@@ -57,13 +59,17 @@ class SpeedControl(AbstractDriver):
     duration: float = eqx.field(static=True)
 
     def __init__(
-        self, driver: AbstractDriver | AbstractManoeuvre, mass, *, wheel_radius=0.3, gain=1.0, integral_time=4.0,
-        drag_area=0.7, rolling_resistance=0.012, drive_limit=4.0, brake_limit=9.0,
+        self, driver: AbstractDriver | AbstractManoeuvre, mass, *, wheel_radius=0.3, gain=None,
+        integral_time=None, drag_area=0.7, rolling_resistance=0.012, drive_limit=4.0, brake_limit=9.0, wheelbase=None,
     ):  # fmt: skip
         self.driver = as_driver(driver)
         self.duration = self.driver.duration
         self.mass, self.wheel_radius = mass, wheel_radius
-        self.gain, self.integral_time = gain, integral_time
+        if wheelbase is not None:
+            check_positive("SpeedControl: wheelbase", wheelbase, "m")
+        size = 1.0 if wheelbase is None else kit.small_size(wheelbase)
+        self.gain = 1.0 / size if gain is None else gain
+        self.integral_time = 4.0 * size if integral_time is None else integral_time
         self.drag_area, self.rolling_resistance = drag_area, rolling_resistance
         self.drive_limit, self.brake_limit = drive_limit, brake_limit
 

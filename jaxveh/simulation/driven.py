@@ -197,6 +197,7 @@ def with_pedals(manoeuvre: AbstractManoeuvre | AbstractDriver, vehicle: Abstract
         wheel_radius=car.wheel_radius,
         drag_area=jnp.maximum(car.drag * (2.0 / manoeuvres_kit.AIR_DENSITY), LEAST),
         rolling_resistance=jnp.maximum(car.rolling_resistance, LEAST),
+        wheelbase=getattr(car, "wheelbase", None),
     )
     return cast(control, dtype_of(vehicle))
 

@@ -14,6 +14,7 @@ from jaxveh.vehicles.shared import (
     AbstractPlaneBody,
     AbstractTwoAxle,
 )
+from jaxveh.vehicles.small_size import small_size
 from jaxveh.vehicles.steering import STEER_UNITS, STEERINGS, AbstractSteeredByRoadWheels, axle_angles
 from jaxveh.vehicles.traction import AbstractSpinless
 from jaxveh.vehicles.two_track import AbstractLoadedTwoTrack, AbstractTwoTrack, air_drag, rolling_wheels
@@ -48,6 +49,7 @@ __all__ = [
     "has_fast_states",
     "planar_loads",
     "rolling_wheels",
+    "small_size",
     "travel_direction",
     "wheel_names",
     "wheels_of",

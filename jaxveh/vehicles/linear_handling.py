@@ -41,7 +41,7 @@ class LinearSingleTrack(AbstractOneTrack):
     A rear axle steered by delta_r has the force `C_r (delta_r - beta + b r / v)`. Gains and responses are those to `steer`, with
     the rear angle that `steering` gives for it. For small angles the speed along the car and that along the path are equal. Here
     `v_x` is the speed along the path, so that the velocity has the components `v cos(beta)` and `v sin(beta)`. In backward
-    travel (v < 0) the slip angles reverse sign, as the tyre forces do. Below `crawl_speed` (m/s, 3 by default) |v| in the
+    travel (v < 0) the slip angles reverse sign, as the tyre forces do. Below `crawl_speed` (m/s) |v| in the
     denominators is `regularised_speed`, so that standstill is a regular point. A bank of the road adds the force `m g_y`; the
     road's friction has no effect, as in any linear law.
 
@@ -83,7 +83,7 @@ class LinearSingleTrack(AbstractOneTrack):
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
         a, b = self.front_axle_to_cg, self.rear_axle_to_cg
-        speed = regularised_speed(u.v_x, self.crawl_speed)
+        speed = regularised_speed(u.v_x, self.slip_floor)
         way = u.v_x / speed
         front, rear = self.load_shares(u, ground)
         steer, steer_rear = axle_angles(self.steering.angles(self, u, u.v_x))

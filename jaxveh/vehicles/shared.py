@@ -17,7 +17,11 @@ from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
 from jaxveh.vehicles.axles import AxleTyres
 from jaxveh.vehicles.base import AbstractVehicle, with_batch_shape
+from jaxveh.vehicles.small_size import small_size
 from jaxveh.vehicles.steering import AbstractSteeredByRoadWheels
+
+CRAWL = 3.0
+"""The speed below which the slips of a full-size car are regularised by default, m/s."""
 
 
 class AbstractPlaneBody(AbstractVehicle):
@@ -35,7 +39,8 @@ class AbstractTwoAxle(AbstractSteeredByRoadWheels):
     """A car with two axles.
 
     **Parameters** of the axles: `front_axle_to_cg`, `rear_axle_to_cg` (m, from the centre of gravity), and `crawl_speed` (m/s),
-    below which slips are regularised.
+    below which slips are regularised: by default 3 m/s, in a car with a wheelbase of less than 2 m times the root of its
+    wheelbase over 2 m (Froude's law).
 
     **Raises** `InputError` for parameters outside their domain.
     """
@@ -43,11 +48,17 @@ class AbstractTwoAxle(AbstractSteeredByRoadWheels):
     _: KW_ONLY
     front_axle_to_cg: jax.Array = positive("m")
     rear_axle_to_cg: jax.Array = positive("m")
-    crawl_speed: float = eqx.field(static=True, default=3.0)
+    crawl_speed: float | None = eqx.field(static=True, default=None)
 
     def __check_init__(self):
         check_parameters(self)
-        check_positive(f"{type(self).__name__}.crawl_speed", self.crawl_speed, "m/s")
+        if self.crawl_speed is not None:
+            check_positive(f"{type(self).__name__}.crawl_speed", self.crawl_speed, "m/s")
+
+    @property
+    def slip_floor(self) -> float | jax.Array:
+        """The speed below which slips are regularised, m/s: `crawl_speed` or its default."""
+        return CRAWL * small_size(self.wheelbase) if self.crawl_speed is None else self.crawl_speed
 
     @property
     def wheelbase(self) -> jax.Array:

@@ -197,11 +197,11 @@ class SingleTrack(AbstractOnAxleTyres):
         cosine, sine = turn
         along, across = (v_x, v_y) if is_straight(sine) else (v_x * cosine + v_y * sine, v_y * cosine - v_x * sine)
         return Contact(
-            slip_angle=slip_angle(along, across, self.crawl_speed),
+            slip_angle=slip_angle(along, across, self.slip_floor),
             load=load,
             friction=friction,
             speed=jnp.abs(along),
-            slip_speed=regularised_speed(along, self.crawl_speed),
+            slip_speed=regularised_speed(along, self.slip_floor),
             direction=travel_direction(along),
         )
 

@@ -130,7 +130,7 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
         places = self.wheel_positions[::2]
         moves = [rolling(p, x.v_x, x.v_y, x.yaw_rate, *turn) for p, turn in zip(places, turned, strict=True)]
         front, rear = (
-            contact(move, load, mu, self.crawl_speed) for move, load, mu in zip(moves, loads, friction, strict=True)
+            contact(move, load, mu, self.slip_floor) for move, load, mu in zip(moves, loads, friction, strict=True)
         )
         return steers, (front, rear), moves
 

@@ -140,7 +140,7 @@ class AbstractLoadedTwoTrack(AbstractTwoTrack, AbstractShiftingLoads):
         g = _, g_y, g_z = gravity(ground)
         steady = self.steady_a_x(x, u, ground, g), self.told_or_own_speed(x, u) * x.yaw_rate - g_y
         loads = self.loads(x, *self.load_transfer.felt_accelerations(x, u, steady), g_z)
-        touching = lambda move, load, mu, speed: contact(move, load, mu, self.crawl_speed, speed)
+        touching = lambda move, load, mu, speed: contact(move, load, mu, self.slip_floor, speed)
         return steers, each_wheel(touching, moves, loads, frictions(ground), self.rim_speeds(x)), moves
 
 

@@ -84,7 +84,7 @@ def touch(
     radius = car.wheel_radius - ROLLING_SHARE * compression
     moves = WheelMotion(at.x * cosine + at.y * sine, at.y * cosine - at.x * sine, cosine, sine)
     camber = numerics.arctan2(axis.z, flat)
-    found = contact(moves, load, friction, car.crawl_speed, omega * radius, camber)
+    found = contact(moves, load, friction, car.slip_floor, omega * radius, camber)
     return found, Touch(arm, radius, axis, turns, moves, -at.z, load - spring)
 
 
