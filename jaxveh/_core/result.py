@@ -10,7 +10,7 @@ import jax.numpy as jnp
 class Result(IntEnum):
     """The outcome of a computation; 0 is success, and the first failure of a run is kept.
 
-    The last two are remarks about a row (`filters.Info.remark`), after which a run continues.
+    `lookahead_misled` and `transport_not_converged` are remarks about a row (`filters.Info.remark`), after which a run continues.
     """
 
     successful = 0
@@ -23,6 +23,7 @@ class Result(IntEnum):
     measurement_too_late = 7
     lookahead_misled = 8
     transport_not_converged = 9
+    measurement_too_far = 10
 
     @property
     def message(self) -> str:
@@ -47,6 +48,8 @@ _MESSAGES = {
     "ParticleFilter)",
     Result.transport_not_converged: "the transport plan did not converge, and particles were resampled systematically "
     "instead (use more iterations, or a larger epsilon)",
+    Result.measurement_too_far: "a measurement is so far from its prediction that their log-likelihood is not finite (look for a "
+    "spike or another unit in it: NaN is missing, and filters.Gated leaves out what does not fit; float64 reaches further)",
 }
 
 

@@ -7,6 +7,7 @@ import enum
 from typing import Any, ClassVar, final
 
 import equinox as eqx
+import jax.numpy as jnp
 
 from jaxveh._core.contracts import Checked, contract
 from jaxveh._core.errors import InputError, check_key, kind_of_inner, word_for
@@ -14,6 +15,7 @@ from jaxveh._core.own_results import belief_and_info, not_none
 from jaxveh._core.parameter import check_parameters
 from jaxveh.numerics import apart
 from jaxveh.statespace.belief import AbstractBelief, Info
+from jaxveh.statespace.measurements import likelihood_result
 from jaxveh.statespace.model import Row, StateSpace
 
 KEPT = "kept for the backward pass"
@@ -102,12 +104,20 @@ class AbstractFilter(Checked, eqx.Module):
 
         **Raises** `InputError` if the filter draws random numbers and there is no key.
         """
-        return apart(self._init, row.t, model, row, key_for(self, key))
+        return apart(self._first, row.t, model, row, key_for(self, key))
 
     @final
     def step(self, model: StateSpace, belief: Any, row: Row) -> tuple[AbstractBelief, Info]:
         """The belief after the next row."""
-        return apart(self._step, belief.count, model, belief, row)
+        return apart(self._next, belief.count, model, belief, row)
+
+    @final
+    def _first(self, model: StateSpace, row: Row, key: Any) -> tuple[AbstractBelief, Info]:
+        return _judged(*self._init(model, row, key))
+
+    @final
+    def _next(self, model: StateSpace, belief: Any, row: Row) -> tuple[AbstractBelief, Info]:
+        return _judged(*self._step(model, belief, row))
 
     @abc.abstractmethod
     def check(self, model: StateSpace) -> None:
@@ -120,6 +130,13 @@ class AbstractFilter(Checked, eqx.Module):
     @abc.abstractmethod
     def _step(self, model: StateSpace, belief: Any, row: Row) -> tuple[AbstractBelief, Info]:
         """The belief after the next row."""
+
+
+def _judged(belief: Any, info: Info) -> tuple[Any, Info]:
+    """A belief and its info, whose infinite log-likelihood is a result code. NaN says that there is none, as of observers."""
+    infinite = jnp.isinf(info.log_likelihood)
+    judged = likelihood_result(info.result, jnp.where(infinite, info.log_likelihood, 0.0))
+    return belief, info._replace(result=judged)
 
 
 class AbstractTwoPartFilter(AbstractFilter):

@@ -202,11 +202,11 @@ def scan_in_form(
         return info.log_likelihood, info.result, of_row, of_belief(belief)
 
     def body(belief, row):
-        belief, info = (filter.step if whole else filter._step)(model, belief, row)
+        belief, info = (filter.step if whole else filter._next)(model, belief, row)
         return belief, shown(belief, info)
 
     if complete:
-        belief, info = numerics.write_out(lambda row: filter._init(model, row, key), first, complete=True)
+        belief, info = numerics.write_out(lambda row: filter._first(model, row, key), first, complete=True)
     else:
         belief, info = filter.init(model, first, key)
     start = shown(belief, info)

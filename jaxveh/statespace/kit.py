@@ -31,7 +31,7 @@ from jaxveh.statespace.driver import (
     scan_in_form,
 )
 from jaxveh.statespace.independent import whiten
-from jaxveh.statespace.measurements import by_channel, input_result, presence
+from jaxveh.statespace.measurements import by_channel, input_result, likelihood_result, presence, result_of_parts
 from jaxveh.statespace.model import scalar_row
 from jaxveh.statespace.noise import LOG_2PI
 from jaxveh.statespace.solvers import EXPLICIT, in_both_modes
@@ -62,8 +62,10 @@ __all__ = [
     "input_result",
     "key_for",
     "layers",
+    "likelihood_result",
     "presence",
     "raise_failure",
+    "result_of_parts",
     "scalar_row",
     "scan_and_keep",
     "scan_by",

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.names import record
-from jaxveh._core.result import Result, code
+from jaxveh._core.result import Result, code, first_failure
 from jaxveh.statespace.model import Row, StateSpace
 
 
@@ -26,6 +26,19 @@ def input_result(model: StateSpace, row: Row):
     bad = [~jnp.isfinite(leaf) for leaf in jax.tree.leaves((row.t, row.u))]
     bad += [jnp.isinf(getattr(row.y, name)) for name in model.channels]
     return jnp.where(jnp.any(jnp.stack(bad)), code(Result.non_finite_input), code(Result.successful))
+
+
+def likelihood_result(result, log_likelihood):
+    """The result code, `measurement_too_far` where it is successful but the log-likelihood is not finite."""
+    lost = (result == 0) & ~jnp.isfinite(log_likelihood)
+    return jnp.where(lost, code(Result.measurement_too_far), result)
+
+
+def result_of_parts(results, log_likelihood):
+    """The result code of a mixture with this log-likelihood, from those of its parts (r,): a part that is too far from the
+    measurement has no weight, and is no failure."""
+    first, _ = first_failure(jnp.where(results == int(Result.measurement_too_far), 0, results))
+    return likelihood_result(first, log_likelihood)
 
 
 def by_channel(model: StateSpace, values, present: dict):

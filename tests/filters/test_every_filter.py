@@ -305,7 +305,10 @@ KEYS = jax.random.split(jax.random.key(7), 2)
 
 @functools.cache
 def found(filter_name, model_name):
-    model, rows = batch(model_name)
+    return of_batch(filter_name, *batch(model_name))
+
+
+def of_batch(filter_name, model, rows):
     line = FILTERS[filter_name]
     if line.differentiable or turn(filter_name) == "gradient":
         return batch_with_gradients(line.make(), model, rows, KEYS)
@@ -450,6 +453,33 @@ def test_float32_stays_float32_and_says_the_same(name):
     if not FILTERS[name].drawn:
         np.testing.assert_allclose(single, value, rtol=2e-4)
         np.testing.assert_allclose(np.stack(short.mean), np.stack(estimate.mean), atol=2e-3)
+
+
+def check_outliers(of, model, rows):
+    """Numbers that are not finite have a code, from the row of the outlier on."""
+    for outlier in (1e10, -1e20, 1e30, 1e160, 1e200):
+        if outlier > float(jnp.finfo(rows.t.dtype).max):
+            continue
+        spiked = rows._replace(y=rows.y._replace(y0=rows.y.y0.at[:, 10].set(outlier)))
+        value, estimate = of(model, spiked)
+        told = (value, estimate.mean, estimate.std, estimate.info.log_likelihood)
+        whole = np.all([np.isfinite(leaf).reshape(2, -1).all(axis=1) for leaf in jax.tree.leaves(told)], axis=0)
+        whole &= ~np.isinf(estimate.info.nis).any(axis=1)
+        failed, at = np.asarray(estimate.result) != 0, np.asarray(estimate.failed_at)
+        assert (failed | whole).all(), outlier
+        assert (at[failed] >= 10).all() and (at[~failed] == -1).all(), (outlier, at)
+
+
+@pytest.mark.parametrize("name", names("straight"))
+def test_an_outlier_that_the_numbers_do_not_bear_is_a_code(name):
+    check_outliers(lambda model, rows: of_batch(name, model, rows)[0], *batch("straight"))
+
+
+@pytest.mark.parametrize("name", names("float32"))
+def test_so_it_is_in_float32(name):
+    check_outliers(
+        lambda model, rows: batch_of_values(FILTERS[name].make(), model, rows, KEYS), *batch("straight", jnp.float32)
+    )
 
 
 @pytest.mark.parametrize("name", [name for name, line in FILTERS.items() if line.linear])

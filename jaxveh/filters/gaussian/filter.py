@@ -301,15 +301,16 @@ def innovation_info(model: StateSpace, row: Row, innovation: Any, white: Any, fa
     count = jnp.sum(jnp.stack([present[name] for name in model.channels]).astype(dtype))
     nis, variances = jnp.sum(white**2), jnp.sum(jnp.square(factor), axis=-1)
     named = lambda values: record("Measurements", dict(zip(model.channels, values, strict=True)))
+    log_likelihood = -0.5 * (nis + numerics.log_det(factor) + count * kit.LOG_2PI)
     return Info(
-        log_likelihood=-0.5 * (nis + numerics.log_det(factor) + count * kit.LOG_2PI),
+        log_likelihood=log_likelihood,
         innovation=kit.by_channel(model, innovation, present),
         innovation_std=kit.by_channel(model, jnp.sqrt(variances), present),
         nis=nis,
         ess=jnp.full((), jnp.nan, dtype),
         whitened=named(white),
         log_scale=named(jnp.log(jnp.diagonal(factor))),
-        result=result,
+        result=kit.likelihood_result(result, log_likelihood),
     )
 
 

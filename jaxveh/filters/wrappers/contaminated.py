@@ -10,13 +10,12 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check, float_array
-from jaxveh._core.result import first_failure
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.wrapper import AbstractStateless
 from jaxveh.filters.wrappers.base import check_independent, variances_of, with_variances
 from jaxveh.filters.wrappers.interacting import mixed_covariance
-from jaxveh.statespace import Info, Smoothing
+from jaxveh.statespace import Info, Smoothing, kit
 
 MOST_CHANNELS = 6
 """The largest number of channels: 64 cases."""
@@ -90,5 +89,5 @@ def _info(every_info: Info, probabilities: Any, log_likelihood: Any) -> Info:
         innovation_std=jax.tree.map(spread, every_info.innovation_std),
         nis=nothing,
         ess=nothing,
-        result=first_failure(every_info.result)[0],
+        result=kit.result_of_parts(every_info.result, log_likelihood),
     )

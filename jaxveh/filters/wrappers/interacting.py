@@ -13,7 +13,6 @@ import numpy as np
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, float_array
 from jaxveh._core.names import as_several
-from jaxveh._core.result import first_failure
 from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
@@ -186,11 +185,12 @@ def _mixture_info(model, row, weights, every_info, log_likelihood) -> Info:
     _, present = kit.presence(model, row)
     mean, std = _mixture_moments(weights, [(info.innovation, info.innovation_std) for info in every_info])
     nothing = jnp.full_like(log_likelihood, jnp.nan)
+    results = jnp.stack([info.result for info in every_info])
     return Info(
         log_likelihood=log_likelihood,
         innovation=kit.by_channel(model, mean, present),
         innovation_std=kit.by_channel(model, std, present),
         nis=nothing,
         ess=nothing,
-        result=first_failure(jnp.where(weights > 0, jnp.stack([info.result for info in every_info]), 0))[0],
+        result=kit.result_of_parts(jnp.where(weights > 0, results, 0), log_likelihood),
     )
