@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar
 
+from jaxveh._core.errors import arguments_in_words
 from jaxveh._core.traced_values import NO_VALUE, raise_with_place
 
 Check = Callable[[str, Any, tuple, Any], None]
@@ -85,11 +86,5 @@ def _check_form(cls: type, name: str, made: Any) -> None:
     try:
         takes.bind(*told, **more)
     except TypeError:
-        wanted, shown = (", ".join(map(_plain, some)) for some in (asked, takes.parameters.values()))
+        wanted, shown = map(arguments_in_words, (asked, takes.parameters.values()))
         raise TypeError(f"{cls.__name__}.{name}({shown}): must take ({wanted}).") from None
-
-
-def _plain(one: inspect.Parameter) -> str:
-    """An argument as a message shows it, without its annotation and a long default."""
-    short = one.default is one.empty or len(repr(one.default)) < 10
-    return str(one.replace(annotation=one.empty)) if short else f"{one.name}=..."

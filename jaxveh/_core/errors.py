@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import inspect
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -124,10 +125,44 @@ def path_of(path) -> Path:
 
 
 def word_for(value) -> str:
-    """Return a value of a wrong type as a message shows it: words and numbers as they are, others by their type."""
+    """Return a value of a wrong kind as every message shows it: words and numbers as they are, an array with its shape, a
+    NamedTuple with its fields, a function by its name, others by their type."""
     if value is None or isinstance(value, str | bool | int | float | complex):
         return repr(value)
-    return f"the class {value.__name__}" if isinstance(value, type) else type(value).__name__
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
+    if isinstance(value, jax.Array | np.ndarray):
+        return f"an array of {value.dtype} of shape {value.shape}"
+    if hasattr(value, "_fields"):
+        return word_for_kind(type(value))
+    return f"the function {value.__name__}" if inspect.isroutine(value) else type(value).__name__
+
+
+def word_for_kind(kind: type) -> str:
+    """Return a kind that is asked for as a message shows it: its name, with the fields of a NamedTuple."""
+    fields = getattr(kind, "_fields", None)
+    return kind.__name__ if fields is None else f"{kind.__name__}({', '.join(fields)})"
+
+
+def arguments_in_words(parameters: Iterable[inspect.Parameter]) -> str:
+    """Return the arguments of a function as a message shows them, without annotations and long defaults."""
+    short = lambda one: one.default is one.empty or len(repr(one.default)) < 10
+    shown = lambda one: str(one.replace(annotation=one.empty)) if short(one) else f"{one.name}=..."
+    return ", ".join(map(shown, parameters))
+
+
+def check_takes(name: str, function, *arguments: str) -> None:
+    """Raise `InputError` unless `function` is a function, or an object that can be called, of these `arguments`, by position."""
+    check_callable(name, function, f"It takes ({', '.join(arguments)}).")
+    try:
+        takes = inspect.signature(function)
+    except (TypeError, ValueError):
+        return  # one of C, which does not tell
+    try:
+        takes.bind(*arguments)
+    except TypeError:
+        shown = arguments_in_words(takes.parameters.values())
+        raise InputError(f"{name} takes ({shown}): must take ({', '.join(arguments)}).") from None
 
 
 def kind_of_inner(value) -> str:

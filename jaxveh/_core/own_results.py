@@ -8,17 +8,7 @@ import jax
 import numpy as np
 
 from jaxveh._core.contracts import Check
-from jaxveh._core.errors import NOT_REAL, InputError
-
-
-def in_words(thing: Any) -> str:
-    """A thing of a wrong kind, or a kind, as a message shows it: its name, with the fields of a NamedTuple."""
-    kind = thing if isinstance(thing, type) else type(thing)
-    fields = getattr(thing, "_fields", None)
-    word = "None" if thing is None else kind.__name__
-    if isinstance(thing, jax.Array | np.ndarray):
-        word = f"an array of {thing.dtype}"
-    return word if fields is None else f"{word}({', '.join(fields)})"
+from jaxveh._core.errors import NOT_REAL, InputError, word_for, word_for_kind
 
 
 def numbers_as_given(who: str, given: Any, result: Any) -> None:
@@ -32,7 +22,7 @@ def numbers_as_given(who: str, given: Any, result: Any) -> None:
     fields = result._asdict() if hasattr(result, "_fields") else {"its result": result}
     for name, value in fields.items():
         if not isinstance(value, int | float) and getattr(getattr(value, "dtype", None), "kind", "O") in NOT_REAL:
-            raise InputError(f"{who}: {name} is {in_words(value)}: must be a real number, or an array of real numbers.")
+            raise InputError(f"{who}: {name} is {word_for(value)}: must be a real number, or an array of real numbers.")
         if whole is not None and not _fits(np.shape(value), whole):
             raise InputError(
                 f"{who}: {name} has shape {np.shape(value)}: must be elementwise, of the shape of what it is given, {whole}."
@@ -51,7 +41,7 @@ def of_kind(kind: Any, *, numbers: bool = True) -> Check:
 
     def check(who: str, owner: Any, given: tuple, result: Any) -> None:
         if getattr(result, "_fields", None) != kind._fields:
-            raise InputError(f"{who}: returned {in_words(result)}: must return {in_words(kind)}.")
+            raise InputError(f"{who}: returned {word_for(result)}: must return {word_for_kind(kind)}.")
         if numbers:
             numbers_as_given(who, (owner, given), result)
 
@@ -73,14 +63,14 @@ def named_record(who: str, owner: Any, given: tuple, result: Any) -> None:
     """Check that a result is a NamedTuple; its fields may be of any kind."""
     del owner, given
     if not hasattr(result, "_fields"):
-        raise InputError(f"{who}: returned {in_words(result)}: must return a NamedTuple.")
+        raise InputError(f"{who}: returned {word_for(result)}: must return a NamedTuple.")
 
 
 def states(who: str, owner: Any, given: tuple, result: Any) -> None:
     """Check that a result is a tuple with a value for each of the `state_names`."""
     del given
     if not isinstance(result, tuple) or len(result) != len(owner.state_names):
-        shown = f"{len(result)} values" if type(result) is tuple else in_words(result)
+        shown = f"{len(result)} values" if type(result) is tuple else word_for(result)
         raise InputError(f"{who}: returned {shown}: must return a NamedTuple of ({', '.join(owner.state_names)}).")
 
 
@@ -97,11 +87,11 @@ def several(*kinds: Any, order: str) -> Check:
     def check(who: str, owner: Any, given: tuple, result: Any) -> None:
         del owner, given
         if type(result) is not tuple or len(result) != len(kinds):
-            shown = f"{len(result)} results" if type(result) is tuple else in_words(result)
+            shown = f"{len(result)} results" if type(result) is tuple else word_for(result)
             raise InputError(f"{who}: returned {shown}: must return {order}.")
         for value, kind in zip(result, kinds, strict=True):
             if not isinstance(value, kind):
-                raise InputError(f"{who}: returned ({', '.join(map(in_words, result))}): must return {order}.")
+                raise InputError(f"{who}: returned ({', '.join(map(word_for, result))}): must return {order}.")
 
     return check
 
@@ -110,7 +100,7 @@ def belief_and_info(who: str, owner: Any, given: tuple, result: Any) -> None:
     """Check that a filter returned two, and that the second, the info, is a NamedTuple."""
     several(object, object, order="two, (belief, info)")(who, owner, given, result)
     if not hasattr(result[1], "_fields"):
-        raise InputError(f"{who}: returned ({', '.join(map(in_words, result))}): must return two, (belief, info).")
+        raise InputError(f"{who}: returned ({', '.join(map(word_for, result))}): must return two, (belief, info).")
 
 
 def instance_of(kind: Any, such_as: str) -> Check:
@@ -119,7 +109,7 @@ def instance_of(kind: Any, such_as: str) -> Check:
     def check(who: str, owner: Any, given: tuple, result: Any) -> None:
         del owner, given
         if not isinstance(result, kind):
-            shown = f"the class {result.__name__}, not called" if isinstance(result, type) else in_words(result)
+            shown = word_for(result) + ", not called" * isinstance(result, type)
             raise InputError(f"{who}: returned {shown}: must return {such_as}.")
 
     return check

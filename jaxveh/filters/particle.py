@@ -10,8 +10,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.contracts import contract
-from jaxveh._core.errors import InputError, check, check_whole, kind_of_inner
-from jaxveh._core.own_results import in_words
+from jaxveh._core.errors import InputError, check, check_whole, kind_of_inner, word_for
 from jaxveh._core.result import Result, code
 from jaxveh.filters.choosing import AbstractResampling, Scheme, as_resampling, log_of
 from jaxveh.filters.particle_belief import ParticleBelief
@@ -240,10 +239,10 @@ class Expected(AbstractAhead):
 def _proposal(who: str, filter_: Any, given: tuple, result: Any) -> None:
     """Raise `InputError` unless there are particles with noise, with the fields and shapes of those given, and a log ratio."""
     if type(result) is not tuple or len(result) != 2:
-        raise InputError(f"{who}: returned {in_words(result)}: must return two, (particles, log ratio or None).")
+        raise InputError(f"{who}: returned {word_for(result)}: must return two, (particles, log ratio or None).")
     (moved, ratio), before = result, given[1]
     if getattr(moved, "_fields", None) != before._fields:
-        raise InputError(f"{who}: its first result is {in_words(moved)}: must be the particles, {in_words(before)}.")
+        raise InputError(f"{who}: its first result is {word_for(moved)}: must be the particles, {word_for(before)}.")
     for name, value in [*zip(moved._fields, moved, strict=True), *([] if ratio is None else [("log ratio", ratio)])]:
         if np.shape(value) != np.shape(before[0]):
             raise InputError(

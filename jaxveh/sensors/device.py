@@ -13,9 +13,17 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.contracts import Checked, contract
-from jaxveh._core.errors import InputError, check_at_least, check_finite, check_key, check_positive, check_single
+from jaxveh._core.errors import (
+    InputError,
+    check_at_least,
+    check_finite,
+    check_key,
+    check_positive,
+    check_single,
+    word_for,
+)
 from jaxveh._core.names import as_mapping
-from jaxveh._core.own_results import in_words, names
+from jaxveh._core.own_results import names
 from jaxveh._core.parameter import check_parameters
 from jaxveh.statespace import cast
 
@@ -30,7 +38,7 @@ def _samples(who: str, device: Any, given: tuple, said: Any) -> None:
 def check_samples(who: str, channels: Iterable[str], shape: tuple[int, ...], said: Any) -> None:
     """Raise `InputError` unless `said` has an array of this shape for each of the channels, and nothing else."""
     if not isinstance(said, Mapping):
-        raise InputError(f"{who}: returned {in_words(said)}: must return a mapping from channels to arrays (n,).")
+        raise InputError(f"{who}: returned {word_for(said)}: must return a mapping from channels to arrays (n,).")
     if set(said) != set(channels):
         raise InputError(
             f"{who}: returned {', '.join(said) or 'nothing'}: must return all these channels and no others: "
@@ -38,7 +46,7 @@ def check_samples(who: str, channels: Iterable[str], shape: tuple[int, ...], sai
         )
     for name, value in said.items():
         if getattr(value, "shape", None) != shape:
-            shown = f"an array {value.shape}" if hasattr(value, "shape") else in_words(value)
+            shown = word_for(value)
             raise InputError(f"{who}: {name} is {shown}: must be an array {shape}, a number for each time.")
 
 

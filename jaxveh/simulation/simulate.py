@@ -144,7 +144,7 @@ def _suite_of(sensors: Any) -> SensorSet | Suite | None:
     if sensors is None or isinstance(sensors, SensorSet | Suite):
         return sensors
     raise InputError(
-        f"simulate: sensors = {_describe(sensors)}: must be a SensorSet such as sensors.esc(), a Suite of devices such as "
+        f"simulate: sensors = {word_for(sensors)}: must be a SensorSet such as sensors.esc(), a Suite of devices such as "
         "sensors.Suite((sensors.IMU(rate=100.0),)), one device, or None. (The key comes after the sensors: key=...)"
     )
 
@@ -158,15 +158,8 @@ def _check_asked(until: Any, key: Any, adjoint: Any, progress: Any) -> None:
     check_progress(progress)
     if not (until is None or isinstance(until, Event)):
         raise InputError(
-            f"simulate: until = {_describe(until)}: must be an Event such as simulation.standstill() (called), or None."
+            f"simulate: until = {word_for(until)}: must be an Event such as simulation.standstill() (called), or None."
         )
-
-
-def _describe(what: Any) -> str:
-    """A short word for an argument of a wrong type."""
-    if isinstance(what, str):
-        return repr(what)
-    return getattr(what, "__name__", type(what).__name__)
 
 
 def driven_car(car: AbstractVehicle, manoeuvre: Any, sensors: SensorSet | None = None, road: Any = None) -> Driven:

@@ -7,9 +7,10 @@ from typing import Any
 
 import equinox as eqx
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_takes, word_for
 from jaxveh._core.names import as_names
 from jaxveh.statespace.noise import AbstractNoise, Gaussian
+from jaxveh.statespace.one_model import wide_levels
 
 
 class StateDependent(eqx.Module):
@@ -32,10 +33,7 @@ class StateDependent(eqx.Module):
     names: tuple[str, ...] = eqx.field(static=True, converter=as_names)
 
     def __check_init__(self):
-        if not callable(self.function):
-            raise InputError(
-                f"StateDependent.function = {type(self.function).__name__}: must be a function of (system, t, x, u)."
-            )
+        check_takes("StateDependent.function", self.function, "system", "t", "x", "u")
         if not self.names:
             raise InputError("StateDependent.names is empty: name at least one channel.")
 
@@ -45,13 +43,15 @@ class StateDependent(eqx.Module):
         law = Gaussian(law) if isinstance(law, Mapping) else law
         if not isinstance(law, AbstractNoise):
             raise InputError(
-                f"StateDependent: its function returned {type(law).__name__}: must be a noise law, or a mapping of standard "
+                f"StateDependent: its function returned {word_for(law)}: must be a noise law, or a mapping of standard "
                 "deviations."
             )
         if sorted(law.names) != sorted(self.names):
             raise InputError(
                 f"StateDependent: its function returned a law of {', '.join(law.names)}: must be of {', '.join(self.names)}."
             )
+        if wide := wide_levels("its law", law):
+            raise InputError(f"StateDependent: {', '.join(wide)}: must be one number each.")
         return law
 
     def around(self, wrap: Callable) -> StateDependent:

@@ -8,7 +8,7 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import InputError, check_positive, check_single
 from jaxveh._core.names import check_names, record_type
 from jaxveh.statespace.dependent_noise import around
 from jaxveh.statespace.independent import combine
@@ -110,6 +110,7 @@ def with_disturbances(
     check_names("felt", felt.values(), model.channels)
     for what, spreads in (("prior", prior), ("walk", walk)):
         for name, value in spreads.items():
+            check_single(**{f"with_disturbances: {what} of {name}": value})
             check_positive(f"{what} of {name}", value, "the state's unit per second")
     disturbances = Disturbances(tuple(prior), tuple(felt.items()))
     kind, dtype = type(model.prior.mean), model.prior.mean[0].dtype

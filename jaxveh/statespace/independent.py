@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_kind
 from jaxveh.statespace.noise import AbstractNoise, Gaussian, MultivariateGaussian, flatten_batch, mask_absent
 
 
@@ -18,6 +18,9 @@ class Independent(AbstractNoise):
     laws: tuple[AbstractNoise, ...]
 
     def __check_init__(self):
+        check_kind("Independent: laws", self.laws, tuple, "A tuple of laws, such as (Gaussian({...}), StudentT(...)).")
+        for law in self.laws:
+            check_kind("Independent: a law", law, AbstractNoise)
         names = self.names
         if len(set(names)) < len(names):
             raise InputError(f"noise laws share fields: {', '.join(names)}; each field has one law.")

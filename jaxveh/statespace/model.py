@@ -10,7 +10,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_numbers, check_single, float_array, is_concrete
+from jaxveh._core.errors import (
+    InputError,
+    check_finite,
+    check_kind,
+    check_numbers,
+    check_single,
+    check_takes,
+    float_array,
+    is_concrete,
+    word_for,
+)
 from jaxveh._core.names import as_names, check_names, record
 from jaxveh._core.own_results import named_record, numbers_as_given
 from jaxveh._core.parameter import UNNAMED
@@ -18,6 +28,7 @@ from jaxveh._core.recording import Recording, check_recording, gap_to_fill, time
 from jaxveh._core.traced import trace_once
 from jaxveh.statespace.dependent_noise import MeasurementNoise, StateDependent
 from jaxveh.statespace.noise import AbstractNoise, Gaussian
+from jaxveh.statespace.one_model import check_one_model
 from jaxveh.statespace.process import AbstractProcessNoise
 
 COARSEST = 0.05
@@ -48,6 +59,8 @@ class Prior(eqx.Module):
     def __init__(self, mean, law):
         if not hasattr(mean, "_fields"):
             raise InputError(f"prior mean = {type(mean).__name__}: must be the state's NamedTuple.")
+        for name, value in mean._asdict().items():
+            check_finite(f"prior mean of {name}", value)
         self.mean = jax.tree.map(float_array, mean)
         self.law = law if isinstance(law, AbstractNoise) else Gaussian(law)
 
@@ -131,6 +144,11 @@ class StateSpace(eqx.Module):
         self.chosen = chosen
 
     def __check_init__(self):
+        check_kind("prior", self.prior, Prior, "statespace.Prior(mean, law) makes one.")
+        _check_function("transition", self.transition_function, "system", "t0", "t1", "x", "u")
+        _check_function("observation", self.observation_function, "system", "t", "x", "u")
+        if self.report_function is not None:
+            _check_function("report", self.report_function, "system", "t", "x", "u")
         if self.process_noise is not None:
             if not isinstance(self.process_noise, AbstractProcessNoise):
                 raise InputError(
@@ -159,23 +177,13 @@ class StateSpace(eqx.Module):
         In float32, times count from the first row, so that steps keep their digits.
         """
         check_recording("StateSpace.rows", recording)
-        self._check_one()
+        check_one_model(self.prior, self.process_noise, self.measurement_noise)
         check_names("recording lacks a channel the model needs", (*self.inputs, *self.channels), recording.names)
         dtype = self.prior.mean[0].dtype
         u = {name: _channel(recording, name, dtype, is_input=True) for name in self.inputs}
         y = {name: _channel(recording, name, dtype, is_input=False) for name in self.channels}
         time = jnp.asarray(time_for(recording, dtype), dtype)
         return Row(time, record("Inputs", u), record("Measurements", y))
-
-    def _check_one(self) -> None:
-        """Raise `InputError` for several models in one, as `jax.vmap` returns them: the prior's means are then no numbers."""
-        wide = {name: np.shape(mean) for name, mean in zip(self.states, self.prior.mean, strict=True) if np.ndim(mean)}
-        if wide:
-            shapes = ", ".join(f"{name} has shape {shape}" for name, shape in wide.items())
-            raise InputError(
-                f"StateSpace: prior.mean: {shapes}: must be one number each. For several models at once use jax.vmap, e.g. "
-                "jax.vmap(lambda model: jaxveh.run(filter, model, recording))(models)."
-            )
 
     def row(self, t, u: Mapping, y: Mapping) -> Row:
         """One row for a live loop from plain numbers; channels left out of `y` are missing."""
@@ -195,7 +203,7 @@ class StateSpace(eqx.Module):
         """The state at `t1` without noise, from the state `x` at `t0`."""
         moved = trace_once(self.transition_function, self.system, t0, t1, x, u)
         if getattr(moved, "_fields", None) != x._fields:
-            raise InputError(f"transition returned {_describe(moved)}: must be the state, with {', '.join(x._fields)}.")
+            raise InputError(f"transition returned {word_for(moved)}: must be the state, with {', '.join(x._fields)}.")
         numbers_as_given("transition", (self.system, t0, t1, x, u), moved)
         return moved
 
@@ -205,7 +213,7 @@ class StateSpace(eqx.Module):
         lacks = [name for name in self.channels if name not in getattr(seen, "_fields", ())]
         if lacks:
             raise InputError(
-                f"observation returned {_describe(seen)}, without {', '.join(lacks)}: must have every channel of the "
+                f"observation returned {word_for(seen)}, without {', '.join(lacks)}: must have every channel of the "
                 f"measurement noise ({', '.join(self.channels)})."
             )
         numbers_as_given("observation", (self.system, t, x, u), seen)
@@ -229,10 +237,10 @@ class StateSpace(eqx.Module):
         return u0 if self.input_path == "held" or not self.inputs else LinearInput(t0, t1, u0, u1)
 
 
-def _describe(value: Any) -> str:
-    """The type of a model function's result, in words."""
-    fields = getattr(value, "_fields", None)
-    return f"a {type(value).__name__}" if fields is None else f"a NamedTuple with {', '.join(fields)}"
+def _check_function(name: str, function: Any, *arguments: str) -> None:
+    check_takes(f"StateSpace: {name}", function, *arguments)
+    if isinstance(function, PerPoint):
+        check_takes(f"StateSpace: {name}.function", function.function, *arguments)
 
 
 def scalar_row(t, numbers: list, dtype, names: tuple[str, ...]) -> tuple:
@@ -241,6 +249,9 @@ def scalar_row(t, numbers: list, dtype, names: tuple[str, ...]) -> tuple:
     **Raises** `InputError` for a time that is not finite or that the dtype resolves too coarsely, and what is no number.
     """
     _check_stamp(t, dtype)
+    for name, number in zip(names, numbers, strict=True):
+        if getattr(number, "ndim", 0):
+            check_single(**{f"row: {name}": number})
     try:
         return _scalars([t, *numbers], dtype)
     except (TypeError, ValueError):

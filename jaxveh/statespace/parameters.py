@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh._core.bijectors import AbstractBijector
-from jaxveh._core.errors import InputError, check, check_kind, did_you_mean, is_concrete
+from jaxveh._core.errors import InputError, check, check_kind, check_single, did_you_mean, is_concrete
 from jaxveh._core.names import as_mapping, record_type
 from jaxveh._core.parameter import Parameter, Where, check_shares, pick, prior_spread, put, resolve, share_of
 from jaxveh._core.parameters import Parameters
@@ -182,6 +182,7 @@ def start_from(model: StateSpace, **physical) -> StateSpace:
         raise InputError(f"start_from: unknown state(s) {', '.join(unknown)}; there are: {there}.{guess}")
     new = {}
     for name, value in physical.items():
+        check_single(**{f"start_from: {name}": value})
         like = getattr(model.prior.mean, name)
         value = jnp.asarray(value, like.dtype)
         new[name] = by_field[name].domain.inverse(value) if name in by_field else value

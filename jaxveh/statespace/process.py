@@ -7,7 +7,7 @@ import abc
 import equinox as eqx
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_kind
 from jaxveh.statespace.independent import combine
 from jaxveh.statespace.noise import AbstractNoise
 
@@ -31,6 +31,7 @@ class Continuous(AbstractProcessNoise):
     law: AbstractNoise
 
     def __check_init__(self):
+        _check_law("Continuous", self.law)
         for law in self.law.parts:
             if not law.adds_up:
                 raise InputError(f"{type(law).__name__} as process noise is the law of one step: wrap it in Discrete.")
@@ -48,8 +49,15 @@ class Discrete(AbstractProcessNoise):
 
     law: AbstractNoise
 
+    def __check_init__(self):
+        _check_law("Discrete", self.law)
+
     def over(self, dt):
         return self.law
+
+
+def _check_law(who: str, law: object) -> None:
+    check_kind(f"{who}: law", law, AbstractNoise, 'Such as Gaussian({"yaw_rate": 0.1}).')
 
 
 class Together(AbstractProcessNoise):

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import check_kind
+from jaxveh._core.errors import InputError, check_kind, check_takes, check_whole, word_for
 from jaxveh._core.traced import trace_once
 from jaxveh.statespace.model import LinearInput
 
@@ -149,7 +149,9 @@ class Propagate(eqx.Module):
     steps: int = eqx.field(static=True, default=1)
 
     def __check_init__(self):
+        check_takes("Propagate: derivatives", self.derivatives, "system", "t", "x", "u")
         check_kind("solver", self.solver, diffrax.AbstractSolver, "Take one such as statespace.RK4() (called).")
+        check_whole("Propagate: steps", self.steps)
 
     def __call__(self, system, t0, t1, x, u):
         term = diffrax.ODETerm(lambda t, y, args: trace_once(_rates, self.derivatives, system, t, y, args))
@@ -163,4 +165,7 @@ class Propagate(eqx.Module):
 
 
 def _rates(derivatives, system, t, x, u):
-    return derivatives(system, t, x, u.at(t) if isinstance(u, LinearInput) else u)
+    rates = derivatives(system, t, x, u.at(t) if isinstance(u, LinearInput) else u)
+    if getattr(rates, "_fields", None) != getattr(x, "_fields", None):
+        raise InputError(f"Propagate: derivatives returned {word_for(rates)}: must return the rates, {word_for(x)}.")
+    return rates if type(rates) is type(x) else type(x)(*rates)

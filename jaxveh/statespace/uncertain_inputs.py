@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import InputError, check_positive, check_single
 from jaxveh._core.names import check_names, record_type
 from jaxveh.statespace.dependent_noise import around
 from jaxveh.statespace.independent import combine
@@ -38,6 +38,7 @@ def uncertain_inputs(
     check_names("uncertain_inputs", std, model.inputs)
     check_names("uncertain_inputs: correlation", times, std)
     for name, value in (*std.items(), *times.items()):
+        check_single(**{f"uncertain_inputs: {name}": value})
         check_positive(f"uncertain_inputs: {name}", value)
     if not std:
         raise InputError("uncertain_inputs: std is empty: give the standard deviation of at least one input's error.")

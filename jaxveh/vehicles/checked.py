@@ -5,25 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from jaxveh._core.errors import InputError
-from jaxveh._core.own_results import in_words, numbers_as_given
+from jaxveh._core.errors import InputError, word_for, word_for_kind
+from jaxveh._core.own_results import numbers_as_given
 
 
 def rates_and_outputs(who: str, vehicle: Any, given: tuple, results: Any) -> None:
     """Raise `InputError` unless `results` are the rates, of the vehicle's own `state_type`, and a NamedTuple of outputs, all real
     numbers of the shape of what is given."""
     if not (isinstance(results, tuple) and len(results) == 2):
-        kind = f"{len(results)} results" if type(results) is tuple else in_words(results)
+        kind = f"{len(results)} results" if type(results) is tuple else word_for(results)
         raise InputError(f"{who}: returned {kind}: must return two, (rates, outputs).")
     rates, outputs = results
     fields = vehicle.state_type._fields
     if getattr(rates, "_fields", None) != fields:
         order = " The order is (rates, outputs)." if getattr(outputs, "_fields", None) == fields else ""
         raise InputError(
-            f"{who}: its first result is {in_words(rates)}: must be {in_words(vehicle.state_type)}.{order}"
+            f"{who}: its first result is {word_for(rates)}: must be {word_for_kind(vehicle.state_type)}.{order}"
         )
     if not hasattr(outputs, "_fields"):
-        raise InputError(f"{who}: its second result is {in_words(outputs)}: must be a NamedTuple of outputs.")
+        raise InputError(f"{who}: its second result is {word_for(outputs)}: must be a NamedTuple of outputs.")
     numbers_as_given(f"{who}: rates", (vehicle, given), rates)
     numbers_as_given(f"{who}: outputs", (vehicle, given), outputs)
 
@@ -34,7 +34,7 @@ def state(who: str, vehicle: Any, given: tuple, result: Any) -> None:
     fields = vehicle.state_type._fields
     unnamed = type(result) is tuple and len(result) == len(fields)
     if not unnamed and getattr(result, "_fields", None) != fields:
-        raise InputError(f"{who}: returned {in_words(result)}: must return {in_words(vehicle.state_type)}.")
+        raise InputError(f"{who}: returned {word_for(result)}: must return {word_for_kind(vehicle.state_type)}.")
 
 
 def state_type(who: str, vehicle: Any, given: tuple, result: Any) -> None:

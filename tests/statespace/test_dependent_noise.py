@@ -87,9 +87,12 @@ def test_draws_of_one_law_are_what_they_were():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: ss.StateDependent({"y": 1.0}, "y"), "StateDependent.function = dict: must be a function of"),
+        (
+            lambda: ss.StateDependent({"y": 1.0}, "y"),
+            r"StateDependent.function = dict: must be a function. It takes",
+        ),
         (lambda: ss.StateDependent(worse, ()), "StateDependent.names is empty"),
-        (lambda: look(lambda s, t, x, u: 1.0), "its function returned float: must be a noise law, or a mapping"),
+        (lambda: look(lambda s, t, x, u: 1.0), "its function returned 1.0: must be a noise law, or a mapping"),
         (lambda: look(lambda s, t, x, u: {"z": 1.0}), "its function returned a law of z: must be of y"),
     ],
 )

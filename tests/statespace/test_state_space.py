@@ -128,13 +128,13 @@ def test_missing_channels_and_inputs_are_named():
 
 def test_what_the_functions_return_is_looked_at():
     other = lambda system, t0, t1, x, u: Force(x.p)
-    with pytest.raises(InputError, match="transition returned a NamedTuple with force: must be the state, with p, v"):
+    with pytest.raises(InputError, match=r"transition returned Force\(force\): must be the state, with p, v"):
         make(transition=other).transition(0.0, 0.1, Pair(0.0, 0.0), Force(0.0))
     plain = lambda system, t0, t1, x, u: (x.p, x.v)
-    with pytest.raises(InputError, match="transition returned a tuple: must be the state"):
+    with pytest.raises(InputError, match="transition returned tuple: must be the state"):
         make(transition=plain).transition(0.0, 0.1, Pair(0.0, 0.0), Force(0.0))
     blind = lambda system, t, x, u: Force(x.p)
-    with pytest.raises(InputError, match=r"observation returned .* force, without y: must have every channel .*\(y\)"):
+    with pytest.raises(InputError, match=r"observation returned Force.force., without y: must have every channel .*\(y\)"):
         make(observation=blind).observation(0.0, Pair(0.0, 0.0), Force(0.0))
 
 

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh._core.contracts import contract
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_positive, real_array
 from jaxveh._core.own_results import instance_of, not_none
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
@@ -121,7 +121,13 @@ def variances_of(model: StateSpace) -> Any:
 
 def with_variances(model: StateSpace, variances: Any) -> StateSpace:
     """The model with these variances (m,) of the measurement noise; of a `CauchyGaussianMixture` of its Gaussian part.
-    **Raises** `InputError` for another law."""
+    **Raises** `InputError` for another law, another shape, and variances that are not positive."""
     check_has_levels("with_variances", model)
     kind = type(model.measurement_noise.std)
+    variances, needed = real_array("with_variances: variances", variances), (len(kind._fields),)
+    if variances.shape != needed:
+        raise InputError(
+            f"with_variances: variances has shape {variances.shape}: must be {needed}, one for each of {', '.join(kind._fields)}."
+        )
+    check_positive("with_variances: variances", variances)
     return eqx.tree_at(lambda m: m.measurement_noise.std, model, kind(*jnp.sqrt(variances)))
