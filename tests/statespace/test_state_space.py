@@ -134,7 +134,9 @@ def test_what_the_functions_return_is_looked_at():
     with pytest.raises(InputError, match="transition returned tuple: must be the state"):
         make(transition=plain).transition(0.0, 0.1, Pair(0.0, 0.0), Force(0.0))
     blind = lambda system, t, x, u: Force(x.p)
-    with pytest.raises(InputError, match=r"observation returned Force.force., without y: must have every channel .*\(y\)"):
+    with pytest.raises(
+        InputError, match=r"observation returned Force.force., without y: must have every channel .*\(y\)"
+    ):
         make(observation=blind).observation(0.0, Pair(0.0, 0.0), Force(0.0))
 
 
