@@ -16,6 +16,7 @@ from jaxveh._core.labelled import TIME, Labelled, Variable, make_again, time_aga
 from jaxveh._core.names import as_mapping, as_names, check_names
 from jaxveh._core.overview import Lazy, Overview, count_of, is_known, missing_share, number, span, stretch
 from jaxveh._core.shown import Kept, above
+from jaxveh._core.time_order import remedy
 
 TRUTH = "true."
 
@@ -73,7 +74,7 @@ class Recording(Kept, eqx.Module):
                 k = int(np.argmax(steps <= 0))
                 raise InputError(
                     f"recording: time[{k + 1}] = {time[k + 1]} after time[{k}] = {time[k]}: must be strictly increasing. "
-                    f"{_remedy(time, k)}"
+                    f"{remedy(time, k)}"
                 )
 
     @classmethod
@@ -309,14 +310,6 @@ def check_recording(who: str, recording: Any) -> None:
         raise InputError(
             f"{who}: recording.time has shape {np.shape(recording.time)}: must be (T,), one drive.{_several(recording)}"
         )
-
-
-def _remedy(time: np.ndarray, k: int) -> str:
-    """What to do about time stamps (T,) of which that in row k + 1 is not larger than that in row k."""
-    if time[k + 1] == time[k] and np.array_equal(time, time.astype(np.float32)) and abs(time[k]) > 1e5:
-        step = np.spacing(np.float32(abs(time[k])))
-        return f"The stamps have lost their digits in float32, whose step is {step:g} s here: write them in float64."
-    return "Two drives in one file? Split them where time steps back; otherwise sort the rows and drop repeated time stamps."
 
 
 def _several(recording: Recording) -> str:

@@ -69,6 +69,10 @@ WEAK_BRAKES = 5e3
 """A twentieth of a bar, Pa: a brake that works reaches more."""
 
 
+FAR = 2.0
+"""How many times the largest other sample a value is that stands for a missing one."""
+
+
 def check_units(log: LogView) -> list[LogFinding]:
     """Check every known channel for magnitudes that no car reaches in SI units, and for negative magnitudes."""
     findings = []
@@ -77,7 +81,8 @@ def check_units(log: LogView) -> list[LogFinding]:
             values = _judged(log, name)
             if not values.size:
                 continue
-            findings.append(_size(name, float(np.quantile(np.abs(values), 0.995)), limit))
+            found = _size(name, float(np.quantile(np.abs(values), 0.995)), limit)
+            findings.append(_placeholder(name, values, limit, found) if found.severity != "ok" else found)
             findings += _negative(name, values) if name in UNSIGNED else []
     return findings
 
@@ -115,6 +120,23 @@ def _size(name: str, size: float, limit: Limit) -> LogFinding:
         message = f"reaches {size:.4g}: too little for {limit.unit}; it looks like kPa, bar or MPa. {advice}"
         return LogFinding(severity, name, message, values)
     return LogFinding("ok", name, f"reaches {size:.4g} ({limit.unit}).", values)
+
+
+def _placeholder(name: str, values: np.ndarray, limit: Limit, found: LogFinding) -> LogFinding:
+    """Return the finding that one value beyond the limit stands for missing ones, if it is the only one; otherwise `found`."""
+    beyond = np.abs(values) > limit.size
+    others = np.abs(values[~beyond])
+    if (
+        not others.size
+        or beyond.sum() < 2
+        or np.ptp(values[beyond]) > 0.0
+        or abs(values[beyond][0]) < FAR * others.max()
+    ):
+        return found
+    value, count = float(values[beyond][0]), int(beyond.sum())
+    otherwise = f"and reaches {others.max():.4g} otherwise"
+    message = f"is {value:g} in {count} samples {otherwise}: does that stand for no value? Set it to NaN."
+    return found._replace(message=message, values={**found.values, "placeholder": value, "count": float(count)})
 
 
 def _negative(name: str, values: np.ndarray) -> list[LogFinding]:

@@ -146,7 +146,7 @@ def _places(
     if named is not None:
         if named > len(lines):
             raise InputError(f"{path}: names_line = {named}: must be at most {len(lines)}.")
-        usual = separator or max(",;\t", key=lines[named - 1].count)
+        usual = separator or max(",;\t|", key=lines[named - 1].count)
         below = [k for k in range(named, len(lines)) if not _is_blank(lines[k])]
         first = next((k for k in below if _is_row(_split(lines[k], usual))), named)
         units = next((k for k in below if k < first and _are_units(_split(lines[k], usual))), None)
@@ -157,7 +157,7 @@ def _places(
             if counts and (found := _above(lines, first, one, counts)) is not None:
                 return *found, first, one
     # What is none of this is read as one line of names, for a message about the rows below.
-    return 0, None, 1, separator or max(",;\t", key=lines[0].count)
+    return 0, None, 1, separator or max(",;\t|", key=lines[0].count)
 
 
 def _alike(lines: Sequence[str], first: int, separator: str) -> tuple[int, ...]:
@@ -186,10 +186,13 @@ def _alike(lines: Sequence[str], first: int, separator: str) -> tuple[int, ...]:
 def _above(lines: Sequence[str], first: int, separator: str, counts: tuple[int, ...]) -> tuple[int, int | None] | None:
     """Return the lines of names and units above the first row, which has one of these numbers of cells; None without names.
 
-    The units are in the line above the rows. They may also be in the one before it, if the last line has cells that are empty or
-    alike, such as the sources of the columns: it names none.
+    A line of one cell just above the rows is the title of their section. The units are in the line above the rows. They may also
+    be in the one before it, if the last line has cells that are empty or alike (sources of the columns): it names none.
     """
-    above = [k for k in range(first) if not _is_blank(lines[k])][-3:]
+    above = [k for k in range(first) if not _is_blank(lines[k])][-4:]
+    if len(above) > 1 and sum(map(bool, _split(lines[above[-1]], separator))) == 1:
+        above.pop()
+    above = above[-3:]
     cells = [_split(lines[k], separator) for k in above]
     fits = lambda one: _filled(one) in counts and _are_words(one)
     names_none = len(above) > 2 and len(set(cells[-1])) < len(cells[-1])
@@ -208,7 +211,7 @@ def _split(line: str, separator: str) -> list[str]:
 
 def _names(line: str, separator: str, path: Path, number: int) -> list[str]:
     names = _split(line.removeprefix("#"), separator)
-    if not names or all(is_number(name) for name in names):
+    if not names or all(map(is_number, names)) or all(map(is_number, line.split())):
         raise InputError(f"{path}: line {number + 1} holds numbers only; the first line must name the columns.")
     return names
 

@@ -13,7 +13,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import ChannelMap
-from jaxveh.io.csv_layout import BLANKS, Layout, find_layout, with_numbers
+from jaxveh.io.csv_layout import BLANKS, COMMENT, Layout, find_layout, with_numbers
 from jaxveh.io.log import TableLog
 from jaxveh.io.naming import split_unit
 from jaxveh.io.optional import require
@@ -51,14 +51,32 @@ def read_columns(path: Path, told: ChannelMap | None = None) -> TextTable:
     frame = _read(path, layout, "strict")
     # Spreadsheets write rows of separators alone.
     frame = frame.dropna(how="all") if frame.iloc[:, 0].isna().any() else frame
+    frame, remarks = _without_comments(path, layout, frame)
     if frame.empty:
         raise InputError(f"{path}: the log is empty: it has columns but no row.")
-    if layout.remarks:
-        warnings.warn(f"{path}: {'; '.join(layout.remarks)}.", JaxvehWarning, stacklevel=2)
+    if remarks := (*layout.remarks, *remarks):
+        warnings.warn(f"{path}: {'; '.join(remarks)}.", JaxvehWarning, stacklevel=2)
     headings = _named(layout.headings, frame)
     _tell_short_rows(path, layout, headings, frame, "strict")
     cells = _cells(with_numbers(headings), frame) | _cells(headings, frame)
     return TextTable(headings, cells, layout.units, layout.decimal)
+
+
+def _without_comments(path: Path, layout: Layout, frame: Any) -> tuple[Any, Sequence[str]]:
+    """Return the rows without comments among them, with a remark; raise `InputError` if the names are there again."""
+    first = frame.iloc[:, 0]
+    if first.dtype.kind in "fiub":
+        return frame, ()
+    texts = first.astype(str).str.strip()
+    if (again := np.flatnonzero(texts == layout.headings[0])).size:
+        raise InputError(
+            f"{path}: data row {again[0] + 1} holds the names of the columns again: several drives in one file? Split it there."
+        )
+    comments = texts.str.startswith(COMMENT).to_numpy(bool)
+    count = int(comments.sum())
+    return (
+        (frame[~comments], (f"{count} line{'s' * (count > 1)} of comments among the rows",)) if count else (frame, ())
+    )
 
 
 def read_below(
@@ -77,10 +95,9 @@ def _tell_short_rows(path: Path, layout: Layout, headings: Sequence[str], frame:
     if not frame.iloc[:, len(headings) - 1].isna().any():
         return
     with path.open(encoding=layout.encoding, errors=errors, newline=None) as file:
-        rows = (
-            (k, _count(line, layout.separator)) for k, line in enumerate(file, 1) if k > layout.first and line.strip()
-        )
-        short = {k: count for k, count in rows if count < len(headings)}
+        rows = ((k, line) for k, line in enumerate(file, 1) if k > layout.first and line.strip())
+        counts = ((k, _count(line, layout.separator)) for k, line in rows if not line.startswith(COMMENT))
+        short = {k: count for k, count in counts if count < len(headings)}
     if not short:
         return
     lacking = ", ".join(headings[min(short.values()) :])
@@ -159,8 +176,13 @@ def _read(path: Path, layout: Layout, errors: str):
     except pandas.errors.EmptyDataError as error:
         raise InputError(f"{path}: the log is empty: it has columns but no row.") from error
     except pandas.errors.ParserError as error:
-        words = re.sub(r"(?<=in line )\d+", lambda found: str(int(found[0]) + above), str(error).strip())
-        raise InputError(f"{path}: {words}. Correct the line, or name the separator.") from error
+        found = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", str(error))
+        names = f"the number of names ({len(layout.headings)}) that were found in line {max(above, 1)} or above"
+        words = f"line {int(found[2]) + above} has {found[3]} cells, more than {names}" if found else str(error).strip()
+        raise InputError(
+            f"{path}: {words}. Correct the line, or give `names_line` and `separator` under [csv] in the channel map; names must "
+            "be in one line."
+        ) from error
     except pandas.errors.ParserWarning as error:
         raise InputError(
             f"{path}: rows have more cells than line {max(above, 1)} has names ({len(layout.headings)}). Correct that line, or "

@@ -18,14 +18,19 @@ from jaxveh._core.errors import InputError, check_flags, did_you_mean, path_of
 
 
 def check_readable(path: Path) -> None:
-    """Raise `InputError` unless `path` is an existing file that can be opened and is not empty."""
+    """Raise `InputError` unless `path` is an existing file that can be opened, is not empty, and is what its name says: not the
+    pointer of a file that was not fetched, nor a web page that was saved in its place."""
     try:
         with path.open("rb") as file:
-            empty = not file.read(1)
+            begin = file.read(64)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}). Check the name and the folder.") from error
-    if empty:
+    if not begin:
         raise InputError(f"{path}: the file is empty.")
+    if begin.startswith(b"version https://git-lfs"):
+        raise InputError(f"{path}: is a pointer of Git LFS, not the file itself: fetch that with `git lfs pull`.")
+    if begin.lstrip().lower().startswith((b"<!doctype html", b"<html")):
+        raise InputError(f"{path}: is a web page: download the file itself (on GitHub: Raw).")
 
 
 def check_suffix(path: Path, allowed: Iterable[str], kind: str = "file") -> str:

@@ -17,11 +17,11 @@ _OF = lambda axis, letter: (
 _LIKELY = {
     "v_x": r"^v$|\bvx\b|^v (ego|veh\w*|car|x|lon\w*)\b|\b(speed|spd|vel\w*|\w*geschw\w*|linear x)\b",
     "yaw_rate": r"\b(yaw|gier|psi|heading) ?(rate|rt|vel\w*|speed|dot|p)\b|\b(gyro\w*|ang\w*( rate| vel\w*)?|rate|omega|g|w) ?z\b"
-    r"|\bz (ang\w* )?(rate|gyro|vel\w*)\b|^omega$|\bgps gyro\b|\bgierrate\b|\bgiergeschw\w*",
+    r"|\bz (ang\w* )?(rate|gyro|vel\w*)\b|^omega$|\ba ?vz\b|\bvel\w* yaw\b|\bgps gyro\b|\bgierrate\b|\bgiergeschw\w*",
     "a_y": _OF(r"(lat(eral)?|quer)", "y"),
     "a_x": _OF(r"(long(itudinal)?|lon|inline|l(ä|ae)ngs)", "x"),
     "steer": r"\b(steer\w*|lenk\w*|swa|sas)\b|\bstr( ?whl| ang)|^delta( (f|fl|front))?$",
-    "time": r"\b(time|zeit\w*|uhrzeit|timestamps?|stamp|millis|clock|elapsed|secs?|seconds)\b|^t$",
+    "time": r"\b(time|zeit\w*|uhrzeit|timestamps?|stamp|millis|clock|elapsed|secs?|seconds)\b|^t$|^x value$",
 }
 """What the words of a name contain, by the known channel for which they stand."""
 _OTHER = {

@@ -217,6 +217,6 @@ def _cell(cell, row: int, what: str, point: str) -> float:
         advice = (
             'Decimal commas: set decimal = "," under [csv] in the channel map.'
             if comma
-            else "Correct the cell, or leave the column out by naming the others in a channel map."
+            else "Correct the cell, delete its row, or leave the column out by naming the others in a channel map."
         )
         raise InputError(f"{what}, data row {row + 1}: {shorten(cell)} is not a number. {advice}") from error

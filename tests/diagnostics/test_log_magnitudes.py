@@ -39,6 +39,17 @@ def test_twice_the_limit_is_found_and_a_tenth_is_not(name):
         assert not [one for one in told({name: 0.1 * limit.size * wave}) if "reaches" in one.message]
 
 
+@pytest.mark.parametrize("name", LIMITS)
+@pytest.mark.parametrize("value", [-9999.0, 65535.0, 1e30])
+def test_a_value_that_stands_for_none_is_found(name, value):
+    limit = LIMITS[name]
+    value = value * max(1.0, 1e-3 * limit.size)
+    sound = 0.2 * limit.size * (np.abs(np.sin(TIME)) + 1e-3 * np.sin(40 * TIME))
+    missing = np.where(np.arange(TIME.size) % 50 == 7, value, sound)
+    (found,) = about(told({name: missing}), "error" if limit.sure else "warning", name, "does that stand for no value")
+    assert found.values["placeholder"] == value and found.values["count"] == TIME.size // 50
+
+
 @pytest.mark.parametrize("name", UNSIGNED)
 def test_a_magnitude_below_zero_is_found_but_not_an_offset_of_the_sensor(name):
     wave = 0.5 * LIMITS[name].size * (1.0 + np.sin(TIME))

@@ -33,6 +33,19 @@ def test_names_of_others_are_taken_for_the_channel_that_they_mean(channel):
     assert kit.likely_names(channel, CANONICAL) == []
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".txt", ".parquet", ".mf4", ".mat", ".nc", ".vbo", ".tir", ".toml"])
+def test_what_was_saved_in_the_place_of_a_file_is_told(tmp_path, suffix):
+    """A pointer of Git LFS, and the web page about a file, have the file's name."""
+    read = {".tir": io.read_property_file, ".toml": io.read_car}.get(suffix, io.read_recording)
+    path = tmp_path / f"file{suffix}"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:12\nsize 123\n")
+    with pytest.raises(InputError, match=r"is a pointer of Git LFS, .*`git lfs pull`"):
+        read(path)
+    path.write_text("\n<!DOCTYPE html>\n<html>\n<body></body></html>\n")
+    with pytest.raises(InputError, match=r"is a web page: download the file itself"):
+        read(path)
+
+
 ENDINGS = [
     (quantity, unit, ending)
     for quantity, units in likely_names._UNITS.items()
@@ -91,6 +104,60 @@ def test_a_line_of_sources_below_the_units_is_not_the_line_of_names(tmp_path, se
     np.testing.assert_allclose(log["speed"], values[:, 1] / 3.6)
     np.testing.assert_allclose(log["a_y"], values[:, 2] * 9.80665)
     np.testing.assert_allclose(log.time, values[:, 0])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_title_of_a_section_above_the_rows_is_not_the_line_of_names(tmp_path, seed):
+    draw = random.Random(seed)
+    separator, units = draw.choice([",", ";", "\t"]), draw.choice([[], [["s", "km/h", "deg/s"]]])
+    lines, values = table_of(draw, 9, [["Offset", "Vehicle Speed", "Yaw"], *units], separator)
+    at = 1 + len(units)
+    title = draw.choice(["[Channel Data]", "-----", "DATA", "***End_of_Header***"])
+    blank = draw.choice([[], [""]])
+    text = "\n".join(["Log of a tool", "", *lines[:at], *blank, title, *lines[at:]])
+    (tmp_path / "log.txt").write_text(text + "\n")
+    with pytest.warns(JaxvehWarning, match="is not read"):
+        log = io.read_recording(
+            tmp_path / "log.txt", io.ChannelMap({"v_x": "Vehicle Speed"}, time=io.Channel("Offset"))
+        )
+    np.testing.assert_allclose(log["v_x"], values[:, 1] / (3.6 if units else 1.0))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_comments_among_the_rows_are_no_rows(tmp_path, seed):
+    draw = random.Random(seed)
+    separator, decimal = draw.choice([(",", "."), (";", "."), (";", ","), ("\t", ",")])
+    lines, values = table_of(draw, 12, [["time", "v_x", "a_y"]], separator, decimal)
+    count = draw.randint(1, 3)
+    for place in sorted(draw.sample(range(4, 13), count), reverse=True):
+        lines.insert(place, draw.choice(["# Lap 1: 00:01:31.2", f"// marker{separator}2", f"#{separator}{separator}"]))
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(lines) + "\n")
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        log = io.read_recording(path)
+    assert [f"{count} line{'s' * (count > 1)} of comments" in str(one.message) for one in heard] == [True]
+    np.testing.assert_allclose(log.time, values[:, 0])
+    np.testing.assert_allclose(log["a_y"], values[:, 2])
+    path.write_text("\n".join([*lines, lines[0], *lines[1:]]) + "\n")
+    with pytest.raises(InputError, match=r"data row \d+ holds the names of the columns again: several drives"):
+        io.read_recording(path)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", "|", " "])
+def test_numbers_without_names_are_told_as_that(tmp_path, separator):
+    (tmp_path / "log.txt").write_text("".join(separator.join(["49.0", "8.4", "112.8"]) + "\n" for _ in range(5)))
+    with pytest.raises(InputError, match="line 1 holds numbers only; the first line must name the columns"):
+        io.read_recording(tmp_path / "log.txt")
+
+
+@pytest.mark.parametrize("period", [256.0, 65536.0, 65.536, 2.0**32 / 1e6, 60.0, 86_400.0, 604_800.0, 86_400_000.0])
+def test_a_time_that_begins_again_is_told_with_its_period(tmp_path, period):
+    step = period / 1000
+    time = np.mod(0.9937 * period + step * np.arange(40), period)
+    (tmp_path / "log.csv").write_text("time,v_x\n" + "".join(f"{t:.9f},1\n" for t in time))
+    with pytest.raises(InputError, match=rf"Does it begin again after {period:.9g}, as .* Then add that"):
+        io.read_recording(tmp_path / "log.csv")
 
 
 @pytest.mark.parametrize("place", ["line", "brackets", "none"])

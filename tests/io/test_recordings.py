@@ -131,7 +131,10 @@ BROKEN_CSV = {
     "name twice": ("time,v_x,v_x\n0,1,2\n", r"several columns are named 'v_x'"),
     "name twice but for units": ("time,v_x [m/s],v_x [km/h]\n0,1,2\n", r"same name without their \[unit\]"),
     "rows longer than the header": ("time,v_x\n0,1,2\n1,1,2\n", r"more cells than line 1 has names \(2\)"),
-    "one row longer": ("time,v_x\n0,1\n1,1,2\n", r"more cells than|Expected 2 fields in line 3, saw 3"),
+    "one row longer": (
+        "time,v_x\n0,1\n1,1,2\n",
+        r"more cells than|line 3 has 3 cells, more than the number of names \(2\)",
+    ),
     "unit of another thing": ("time,yaw_rate [m]\n0,1\n", r"yaw_rate: unit 'm' is of another quantity.*'rad/s'"),
     "unit unknown": ("time,yaw_rate [furlogs]\n0,1\n", r"yaw_rate: unit 'furlogs' is not known"),
 }
