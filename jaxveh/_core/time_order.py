@@ -18,6 +18,11 @@ def remedy(time: np.ndarray, k: int) -> str:
     if time[k + 1] == time[k] and np.array_equal(time, time.astype(np.float32)) and abs(time[k]) > 1e5:
         step = np.spacing(np.float32(abs(time[k])))
         return f"The stamps have lost their digits in float32, whose step is {step:g} s here: write them in float64."
+    if time[k + 1] == time[k]:
+        return (
+            "Two rows have this time: an event of a simulation, or stamps that are too coarse? Write more digits; otherwise sort "
+            "the rows and drop repeated time stamps."
+        )
     step, back = np.median(np.diff(time)), time[k] - time[k + 1]
     for period, what in ROLLS.items():
         if step < 0.1 * period and abs(back + step - period) <= max(2.0 * step, 1e-6 * period):

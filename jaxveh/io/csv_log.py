@@ -72,7 +72,8 @@ def _without_comments(path: Path, layout: Layout, frame: Any) -> tuple[Any, Sequ
         raise InputError(
             f"{path}: data row {again[0] + 1} holds the names of the columns again: several drives in one file? Split it there."
         )
-    comments = texts.str.startswith(COMMENT).to_numpy(bool)
+    # A car named #78 has a row of its own.
+    comments = (texts.str.startswith(COMMENT) & (frame.iloc[:, 1:].isna().mean(axis=1) >= 0.5)).to_numpy(bool)
     count = int(comments.sum())
     return (
         (frame[~comments], (f"{count} line{'s' * (count > 1)} of comments among the rows",)) if count else (frame, ())

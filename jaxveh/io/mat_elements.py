@@ -41,6 +41,12 @@ def variables_of(data: bytes) -> Iterator[tuple[str, Any]]:
     """
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if order is None:
+        # Version 4 begins with a whole number: its order of bytes, kind of numbers and of matrix, each a digit.
+        if int.from_bytes(data[:4], "little") in range(60) or int.from_bytes(data[:4], "big") in range(1000, 1060):
+            raise InputError(
+                "it is of version 4, as Dymola and OpenModelica write results; export CSV there, or load it in MATLAB and "
+                "save it with -v7"
+            )
         raise InputError("it begins neither as version 5 nor as 7.3; save it again with -v7")
     reader = _Elements(data, HEADER, len(data), order)
     while reader.left():

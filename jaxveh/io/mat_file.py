@@ -34,7 +34,8 @@ def read_mat(path: Path) -> dict[str, Any]:
         return dict(variables_of(path.read_bytes()))
     except Exception as error:  # HDF5 raises any kind of error for a damaged block
         reason = str(error) or type(error).__name__
-        raise InputError(f"{path}: is not a readable MATLAB file ({reason}). Is the file damaged?") from error
+        doubt = "" if "version 4" in reason else " Is the file damaged?"
+        raise InputError(f"{path}: is not a readable MATLAB file ({reason}).{doubt}") from error
 
 
 def _read_new(h5py: Any, path: Path) -> dict[str, Any]:

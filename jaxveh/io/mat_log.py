@@ -58,7 +58,8 @@ def open_mat(path: Path, channels: ChannelMap | None) -> NestedLog:
     if not leaves:
         raise InputError(
             f"{path}: no vector belongs to a time vector ({', '.join(TIME_NAMES)}); found: {in_words(objects)}. "
-            'Name the time in a channel map: time = "COLUMN". Only MATLAB can read objects (timeseries, Dataset, timetable): '
+            'Name the time in a channel map: time = "COLUMN". Save the rows of a matrix as vectors with names. Only MATLAB can '
+            "read objects (timeseries, Dataset, timetable): "
             "save their fields, such as log.v_x.Time and log.v_x.Data."
         )
     return NestedLog(path, leaves, without=f"Not read: {in_words(objects)}." if objects else "")

@@ -139,6 +139,10 @@ def test_comments_among_the_rows_are_no_rows(tmp_path, seed):
     assert [f"{count} line{'s' * (count > 1)} of comments" in str(one.message) for one in heard] == [True]
     np.testing.assert_allclose(log.time, values[:, 0])
     np.testing.assert_allclose(log["a_y"], values[:, 2])
+    cars = [f"car{separator}{lines[0]}", *(f"#78{separator}{line}" for line in lines[1:] if line[0] not in "#/")]
+    path.write_text("\n".join(cars) + "\n")
+    with pytest.warns(JaxvehWarning, match="left out 'car'"):
+        assert len(io.read_recording(path)) == 12
     path.write_text("\n".join([*lines, lines[0], *lines[1:]]) + "\n")
     with pytest.raises(InputError, match=r"data row \d+ holds the names of the columns again: several drives"):
         io.read_recording(path)

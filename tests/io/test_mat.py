@@ -1,5 +1,6 @@
 """MATLAB's files as logs, of version 5 by scipy's writer and of version 7.3 in MATLAB's own layout."""
 
+import struct
 import warnings
 from pathlib import Path
 
@@ -209,3 +210,13 @@ def test_a_time_within_a_struct_has_the_maps_unit(version, tmp_path):
     (tmp_path / "map.toml").write_text('time = { column = "log.time", unit = "ms" }\n[channels]\nv_x = "log.vx"\n')
     found = io.read_recording(tmp_path / "log.mat", io.read_channel_map(tmp_path / "map.toml"))
     np.testing.assert_allclose(found.time, T)
+
+
+@pytest.mark.parametrize("format", ["<", ">"])
+def test_version_4_is_told_with_who_writes_it(tmp_path, format):
+    """Dymola and OpenModelica write it: a number of four digits, rows, columns, 0, length of the name, the name, the numbers."""
+    numbers = np.linspace(0.0, 1.0, 11)
+    head = struct.pack(f"{format}5i", 1000 if format == ">" else 0, 11, 1, 0, 5)
+    (tmp_path / "log.mat").write_bytes(head + b"time\0" + numbers.astype(f"{format}f8").tobytes())
+    with pytest.raises(InputError, match=r"it is of version 4, as Dymola and OpenModelica .*with -v7\)\.$"):
+        io.read_recording(tmp_path / "log.mat")
