@@ -58,26 +58,26 @@ ENDINGS = [
 def test_a_unit_in_a_name_is_not_taken_for_si(tmp_path, quantity):
     """A mapped column whose name ends with a unit other than SI needs the unit, a scale, or SI by word."""
     path = tmp_path / "log.csv"
-    for unit, ending in [(unit, ending) for one, unit, ending in ENDINGS if one == quantity]:
+    names = [name for name, known in CANONICAL.items() if known.unit == quantity and name != "time"] or ["time"]
+    endings = [(unit, ending) for one, unit, ending in ENDINGS if one == quantity]
+    for k in range(max(len(names), len(endings))):
+        name, (unit, ending) = names[k % len(names)], endings[k % len(endings)]
         column = f"sensor_{ending.replace(' ', '_')}"
-        for name in [name for name, known in CANONICAL.items() if known.unit == quantity and name != "time"] or [
-            "time"
-        ]:
-            path.write_text(f"clock,{column}\n0,1\n1,2\n" if name != "time" else f"{column},v\n0,1\n1,2\n")
-            read = lambda name=name, column=column, **told: io.read_recording(
-                path,
-                io.ChannelMap({"v": "v"}, time=io.Channel(column, **told))
-                if name == "time"
-                else io.ChannelMap({name: io.Channel(column, **told)}, time=io.Channel("clock")),
-            )
-            last = lambda log, name=name: float(log.time[1] if name == "time" else log[name][0])
-            if unit == quantity:
-                assert last(read()) == 1.0
-                continue
-            with pytest.raises(InputError, match=rf"ends as if it were in {unit}, and no unit .*Add unit = \"{unit}\""):
-                read()
-            assert last(read(unit=quantity)) == 1.0 == last(read(scale=0.5)) * 2.0
-            assert 0.0 < last(read(unit=unit)) != 1.0
+        path.write_text(f"clock,{column}\n0,1\n1,2\n" if name != "time" else f"{column},v\n0,1\n1,2\n")
+        read = lambda name=name, column=column, **told: io.read_recording(
+            path,
+            io.ChannelMap({"v": "v"}, time=io.Channel(column, **told))
+            if name == "time"
+            else io.ChannelMap({name: io.Channel(column, **told)}, time=io.Channel("clock")),
+        )
+        last = lambda log, name=name: float(log.time[1] if name == "time" else log[name][0])
+        if unit == quantity:
+            assert last(read()) == 1.0
+            continue
+        with pytest.raises(InputError, match=rf"ends as if it were in {unit}, and no unit .*Add unit = \"{unit}\""):
+            read()
+        assert last(read(unit=quantity)) == 1.0 == last(read(scale=0.5)) * 2.0
+        assert 0.0 < last(read(unit=unit)) != 1.0
 
 
 def table_of(draw, rows, heads, separator, decimal="."):
