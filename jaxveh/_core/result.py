@@ -58,6 +58,11 @@ def code(result: Result):
     return jnp.int32(int(result))
 
 
+def with_reason(result, failed, reason: Result):
+    """The code `result`, or that of `reason` where `failed` and nothing went wrong before."""
+    return jnp.where((result == 0) & failed, code(reason), result)
+
+
 def first_failure(codes):
     """Return the first non-zero code along axis 0 and its index (-1 if all succeeded); codes: (T,) int32."""
     failed = codes != 0

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.names import as_pairs, check_names
-from jaxveh._core.result import Result, code
+from jaxveh._core.result import Result, code, with_reason
 from jaxveh.filters.outer_belief import AbstractTransparentBelief, either
 from jaxveh.statespace import AbstractFilter, AbstractWrapper, Gradient, Info, Row, StateSpace, kit
 
@@ -92,7 +92,7 @@ class Delayed(AbstractWrapper):
             too_late = too_late | (late & (piece.t >= belief.began))
             belief = self._with_rows(model, belief, piece, real & ~late)
         inside, said, info = jax.lax.cond(in_order, self._onward, self._anew, model, before, belief, prompt)
-        result = jnp.where((info.result == 0) & too_late, code(Result.measurement_too_late), info.result)
+        result = with_reason(info.result, too_late, Result.measurement_too_late)
         info = info._replace(log_likelihood=said - before.said, result=result)
         after = DelayedBelief(inside, belief.base, belief.rows, belief.real, belief.base_said, said, belief.began)
         return after, info

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import check_whole
-from jaxveh._core.result import Result, code
+from jaxveh._core.result import Result, with_reason
 from jaxveh.filters.gaussian.filter import (
     check_covariances,
     innovation_info,
@@ -143,9 +143,8 @@ class Ensemble(AbstractTwoPartFilter):
             moved = mean[:, None] + (self.members - 1) ** 0.5 * (X - times(lesser, E))
         white = numerics.solve_lower(factor, innovation)
         after = EnsembleBelief(type(belief.members)(*moved), belief.key, row.t, row.u, belief.count + 1)
-        result = kit.input_result(model, row)
         lost = ~(jnp.all(jnp.isfinite(moved)) & jnp.all(jnp.isfinite(factor)))
-        result = jnp.where((result == 0) & lost, code(Result.non_finite_state), result)
+        result = with_reason(kit.input_result(model, row), lost, Result.non_finite_state)
         return after, innovation_info(model, row, innovation, white, factor, result)
 
 

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_finite
-from jaxveh._core.result import Result, code
+from jaxveh._core.result import Result, with_reason
 from jaxveh.statespace import AbstractBelief, AbstractTwoPartFilter, Info, Row, StateSpace, kit
 
 
@@ -101,7 +101,6 @@ def observe(model: StateSpace, row: Row, vector: Any) -> Any:
 
 def _info(model, row, error, present, vector) -> Info:
     nothing = jnp.full((), jnp.nan, vector.dtype)
-    result = kit.input_result(model, row)
     lost = ~jnp.all(jnp.isfinite(vector))
     return Info(
         log_likelihood=nothing,
@@ -109,7 +108,7 @@ def _info(model, row, error, present, vector) -> Info:
         innovation_std=kit.by_channel(model, jnp.full_like(error, jnp.nan), present),
         nis=nothing,
         ess=nothing,
-        result=jnp.where((result == 0) & lost, code(Result.non_finite_state), result),
+        result=with_reason(kit.input_result(model, row), lost, Result.non_finite_state),
     )
 
 

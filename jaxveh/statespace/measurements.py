@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.names import record
-from jaxveh._core.result import Result, code, first_failure
+from jaxveh._core.result import Result, code, first_failure, with_reason
 from jaxveh.statespace.model import Row, StateSpace
 
 
@@ -30,8 +30,7 @@ def input_result(model: StateSpace, row: Row):
 
 def likelihood_result(result, log_likelihood):
     """The result code, `measurement_too_far` where it is successful but the log-likelihood is not finite."""
-    lost = (result == 0) & ~jnp.isfinite(log_likelihood)
-    return jnp.where(lost, code(Result.measurement_too_far), result)
+    return with_reason(result, ~jnp.isfinite(log_likelihood), Result.measurement_too_far)
 
 
 def result_of_parts(results, log_likelihood):

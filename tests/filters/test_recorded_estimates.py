@@ -1,4 +1,4 @@
-"""What every filter makes of a short recording, by every setting that changes it, as recorded.
+"""What every filter makes of a short recording, by every setting that changes it, as recorded; and the codes of failures.
 
 One of every class of filters runs by default, whatever it takes: of many no other test there runs a step.
 Particles, too: their draws are of a key, and rounding moves an ancestor about once in a thousand million draws.
@@ -11,7 +11,7 @@ import pytest
 from recorded_numbers import check_declared, check_recorded, classes_of, unrecorded
 from test_every_filter import CHANGES, FILTERS, GROUPS, MODELS, N, batch, noisier, recordings, same
 
-from jaxveh import Recording, filters, numerics, statespace
+from jaxveh import Recording, Result, filters, numerics, statespace
 from jaxveh.filters import SquareRoot
 
 FEW = filters.ParticleFilter(N, threshold=0.6)
@@ -63,10 +63,10 @@ def test_every_filter_and_setting_has_numbers():
     assert not unrecorded(__file__, [*FILTERS, *MORE])
 
 
-FIRST = list({type(line.make()): name for name, line in reversed(FILTERS.items())}.values())
+MAKERS = {name: line.make for name, line in FILTERS.items()} | MORE
+FIRST = list({type(make()): name for name, make in reversed(MAKERS.items())}.values())
 """The first setting of every class."""
 
-MAKERS = {name: line.make for name, line in FILTERS.items()} | MORE
 ROWS = 12
 
 
@@ -89,13 +89,43 @@ def test_estimates_by_other_settings_are_those_recorded(name):
     check_estimate(name)
 
 
-def check_estimate(name):
+def given(name):
     filter_, linear = MAKERS[name](), name in FILTERS and FILTERS[name].linear
     model, rows = batch("linear" if linear else "pendulum")
     rows = jax.tree.map(lambda leaf: leaf[0, :ROWS], rows)
     rows = rows._replace(u=jax.tree.map(lambda force: 0.1 + abs(force), rows.u))  # some filters take it for a spread
+    return filter_, model, rows
+
+
+def check_estimate(name):
+    filter_, model, rows = given(name)
     filter_.check(model)
     check_recorded(__file__, name, short(filter_, model, rows, jax.random.key(5)))
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize("name", FIRST)
+def test_what_is_not_finite_has_a_code(name):
+    """The estimate is of rows 2, 5, 8 and 11."""
+
+    def codes(**changed):
+        """By values, each at its row."""
+        filter_, model, rows = given(name)
+        for channel, (k, value) in changed.items():
+            at = lambda rows, channel=channel: getattr(rows.u if channel == "force" else rows.y, channel)
+            rows = eqx.tree_at(at, rows, at(rows).at[k].set(value))
+        mean, _, _, info = short(filter_, model, rows, jax.random.key(5))
+        told = np.asarray(info.result)
+        assert (told != 0)[np.any(np.isnan(mean), axis=0)].all()
+        return told
+
+    assert codes(y0=(5, np.inf)).tolist() == [0, Result.non_finite_input, 0, 0]
+    lost = codes(force=(8, np.nan))
+    assert lost[:2].tolist() == [0, 0] and lost[2] == Result.non_finite_input
+    push = (4, 1e300)  # finite, its square is not
+    assert codes(force=push)[0] == 0
+    assert codes(force=push, y0=(5, np.inf))[1] == Result.non_finite_input
+    assert codes(y0=(5, 1e200))[0] == 0
 
 
 SMOOTHERS = {

@@ -14,7 +14,7 @@ from jaxveh._core.contracts import contract
 from jaxveh._core.errors import InputError, JaxvehWarning, check, kind_of_inner, word_for
 from jaxveh._core.names import record
 from jaxveh._core.own_results import belief_and_info, instance_of, not_none, of_kind
-from jaxveh._core.result import Result, code
+from jaxveh._core.result import Result, with_reason
 from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
 from jaxveh.filters.gaussian.forms import AbstractForm, Spread
 from jaxveh.filters.gaussian.noises import law_at
@@ -329,5 +329,5 @@ def _result(model, row, beliefs, image: Image, factor):
         (factor, indefinite),
         (after.factor, indefinite),
     ):
-        result = jnp.where((result == 0) & ~jnp.all(jnp.isfinite(values)), code(reason), result)
+        result = with_reason(result, ~jnp.all(jnp.isfinite(values)), reason)
     return result

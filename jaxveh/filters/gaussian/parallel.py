@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.result import Result, code
+from jaxveh._core.result import Result, with_reason
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import innovation_info, observation_image, transition_image, wrapped_innovation
 from jaxveh.filters.gaussian.forms import masked_factor
@@ -201,9 +201,8 @@ def info_of(model: StateSpace, rows: Row, passed: Passed, *, complete: bool = Fa
         innovation = wrapped_innovation(model, y - line.slope @ mean - line.offset, here)
         factor = numerics.cholesky(line.slope @ covariance @ line.slope.T + line.error + R)
         white = numerics.solve_lower(factor, innovation)
-        result = kit.input_result(model, row)
         lost = ~jnp.all(jnp.isfinite(factor))
-        result = jnp.where((result == 0) & lost, code(Result.not_positive_definite), result)
+        result = with_reason(kit.input_result(model, row), lost, Result.not_positive_definite)
         return innovation_info(model, row, innovation, white, factor, result)
 
     return jax.vmap(of)(rows, y, R, *passed.predicted, passed.lines)

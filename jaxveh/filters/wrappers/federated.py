@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
 from jaxveh._core.names import as_groups, as_several, check_names, record
-from jaxveh._core.result import Result, code
+from jaxveh._core.result import Result, with_reason
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.forms import Spread
@@ -162,7 +162,7 @@ class Federated(AbstractWrapper):
             master, master.vector, Spread(master.factor, master.matrix), row.t, row.u, belief.count + 1
         )
         lost = ~(jnp.all(jnp.isfinite(master.factor)) & jnp.all(jnp.isfinite(master.vector)))
-        result = jnp.where((info.result == 0) & lost, code(Result.not_positive_definite), info.result)
+        result = with_reason(info.result, lost, Result.not_positive_definite)
         locals_ = tuple(jax.tree.map(lambda leaf, i=i: leaf[i], believed) for i in range(len(self.groups)))
         found = FederatedBelief(master, locals_, self._new_shares(model, belief, locals_), alarm)
         return found, info._replace(result=result)
