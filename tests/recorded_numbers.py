@@ -12,7 +12,9 @@ import json
 import os
 from pathlib import Path
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 FOLDER = Path(__file__).parent / "recorded"
@@ -100,6 +102,46 @@ def check_recorded(test_file, name, values, rtol=1e-7, given=False):
         expected = np.asarray(known[name][at], float)
         largest = 0.0 if given else np.abs(expected[np.isfinite(expected)]).max(initial=0.0)
         np.testing.assert_allclose(leaf, expected, rtol=rtol, atol=rtol * largest, err_msg=f"{name}: {at}")
+
+
+def lively(tree, size=0.1):
+    """A tree of modules each of whose numbers that is 0 or 1 has become another one, so that no term and no factor is without
+    effect: up to `size` instead of 0."""
+    random = np.random.default_rng(7)
+    near = {
+        0.0: lambda: random.choice([-1, 1]) * random.uniform(0.2, 1.0) * size,
+        1.0: lambda: random.uniform(0.8, 0.95),
+    }
+    drawn = lambda leaf: jnp.asarray(near[float(leaf)]()) if np.size(leaf) == 1 and float(leaf) in near else leaf
+    return jax.tree.map(lambda leaf: drawn(leaf) if eqx.is_inexact_array(leaf) else leaf, tree)
+
+
+def without_effect(members, package):
+    """What no member on record tells from another formula, by class and field of a package's modules: numbers that are 0 or 1 in
+    all members, so that a term or a factor may be missing, and options that are None, or one flag or word, in all."""
+    seen = {}
+    for kind, name, value in _fields(members):
+        if kind.__module__.startswith(package):
+            seen.setdefault(f"{kind.__name__}.{name}", []).append(value)
+    return {name for name, values in seen.items() if _same(values)}
+
+
+def _fields(thing):
+    if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+        for field in dataclasses.fields(thing):
+            yield type(thing), field.name, getattr(thing, field.name)
+            yield from _fields(getattr(thing, field.name))
+    elif isinstance(thing, list | tuple | dict):
+        for one in thing.values() if isinstance(thing, dict) else thing:
+            yield from _fields(one)
+
+
+def _same(values):
+    given = [value for value in values if value is not None]
+    if all(isinstance(value, bool | str) for value in given):
+        return len(set(given)) < 2
+    numbers = [value for value in given if isinstance(value, float | int | np.ndarray | jax.Array)]
+    return len(numbers) == len(given) and all(np.isin(number, (0, 1)).all() for number in numbers)
 
 
 def _one_leaf_a_line(known):

@@ -9,7 +9,7 @@ import pytest
 import test_every_dynamic_tyre
 import test_every_tyre
 import test_wrappers
-from recorded_numbers import check_declared, check_recorded, classes_of
+from recorded_numbers import check_declared, check_recorded, classes_of, lively, without_effect
 from shared_data import shared
 
 from jaxveh import tyres
@@ -22,13 +22,13 @@ def file(name):
     return lambda: tyres.from_property_file(shared("tyres") / name)
 
 
-def every_coefficient():
-    """An MF-Tyre none of whose coefficients is zero: files leave many out."""
-    random, tyre = np.random.default_rng(7), tyres.typical_mf_tyre(4000.0)
-    groups = ("longitudinal", "lateral", "aligning", "overturning", "rolling")
-    parts = {name: getattr(tyre, name) for name in groups} | {"turn_slip": tyres.mf_tyre.TurnSlip()}
-    drawn = lambda number: number if number != 0 else jnp.asarray(random.choice([-1, 1]) * random.uniform(0.02, 0.1))
-    return dataclasses.replace(tyre, spins=True, **{name: jax.tree.map(drawn, part) for name, part in parts.items()})
+def every_coefficient(**more):
+    """An MF-Tyre none of whose coefficients is zero, none of whose factors is one, with ranges that contacts leave: files leave
+    many out."""
+    tyre = dataclasses.replace(tyres.typical_mf_tyre(4000.0), turn_slip=tyres.mf_tyre.TurnSlip(PDXP3=4.0))
+    ranges = tyres.mf_tyre.Ranges(-0.21, 0.22, -0.23, 0.24, -0.07, 0.08, 1500.0, 7000.0, 2.0e5, 3.0e5, 5.0)
+    body = dataclasses.replace(lively(tyre.structure), Q_FYS1=9000.0, Q_FYS2=7000.0, Q_FYS3=5000.0)
+    return dataclasses.replace(lively(tyre, 0.6), ranges=ranges, structure=body, **more)
 
 
 def curves(**more):
@@ -45,7 +45,12 @@ MORE = {
     "MF-Tyre 6.1": file("mfeval__MagicFormula61_Parameters.tir"),
     "MF-Tyre 5.2": file("chrono__hmmwv__tire__HMMWV_pacejka.tir"),
     "MF-Tyre of a race car": file("tumftm__pa_sim_tireparameters.tir"),
-    "MF-Tyre with every coefficient": every_coefficient,
+    "MF-Tyre with every coefficient": lambda: every_coefficient(spins=True),
+    "MF-Tyre of small angles, without limits": lambda: every_coefficient(limits=False, angles=False),
+    "MF-Tyre 5.2 with every coefficient": lambda: every_coefficient(version=52),
+    "FialaPolynomial, as printed": lambda: tyres.FialaPolynomial(
+        90000.0, 60000.0, 0.9, 0.03, contact_length=0.11, as_printed=True
+    ),
     "generic": lambda: tyres.kit.GENERIC_TYRE.magic_formula(60000.0, 4000.0),
     "relaxed MF-Tyre": test_every_dynamic_tyre.own_lengths,
 }
@@ -100,6 +105,39 @@ def test_forces_are_those_recorded(name):
     check_recorded(__file__, name, said(tyre, contacts()))
     numbers = [leaf for leaf in jax.tree.leaves(tyre) if leaf.size == 1]
     check_recorded(__file__, f"{name}: coefficients", np.stack(numbers), given=True)
+
+
+@jax.jit
+def outputs(tyre):
+    """Loaded radii, patch and lags, beside the forces, while the wheel turns on the spot, too."""
+    at = contacts()
+    return jax.vmap(tyre.outputs)(at._replace(turn_slip=20.0 * at.turn_slip))._asdict()
+
+
+VERSIONS = {52: {}, 61: {"spins": True}, 62: {}}
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_outputs_of_mf_tyres_are_those_recorded(version):
+    check_recorded(__file__, f"outputs: {version}", outputs(every_coefficient(version=version, **VERSIONS[version])))
+
+
+def test_every_coefficient_has_an_effect_on_what_is_on_record():
+    made = [every_coefficient(version=version, **more) for version, more in VERSIONS.items()]
+    before = [outputs(tyre) for tyre in made]
+    paths, leaves = zip(*jax.tree_util.tree_leaves_with_path(made[0]), strict=True)
+    idle = set()
+    for place, (path, leaf) in enumerate(zip(paths, leaves, strict=True)):
+        changed = [*leaves[:place], 1.1 * leaf, *leaves[place + 1 :]]
+        after = [outputs(jax.tree.unflatten(jax.tree.structure(tyre), changed)) for tyre in made]
+        differ = lambda one, other: np.abs(one - other).max() > 1e-6 * np.abs(one).max()
+        if not any(map(differ, *(jax.tree.leaves(jax.device_get(found)) for found in (before, after)))):
+            idle.add(path[-1].name)
+    assert idle == {"INFLPRES", "RIM_RADIUS", "BOTTOM_OFFST"}  # what the equations do not read: checks of a file do
+
+
+def test_every_number_and_option_of_a_law_stands_out_in_a_tyre_on_record():
+    assert without_effect([make() for make in TYRES.values()], "jaxveh.tyres") == set()
 
 
 DECLARED = classes_of(tyres, tyres.mf_tyre)

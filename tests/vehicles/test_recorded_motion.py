@@ -10,13 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from planar_cars import MAKERS, point
-from recorded_numbers import check_declared, check_recorded, classes_of, declared_names
+from recorded_numbers import check_declared, check_recorded, classes_of, declared_names, lively, without_effect
 from test_every_steering import STEERINGS
 from test_every_steering import made as steered
 from test_every_steering import stirred as steered_point
 from test_every_vehicle import CARS, ROUGH, made, seven, shifted_mf, start, stirred
 
-from jaxveh import InputError, vehicles
+from jaxveh import InputError, roads, vehicles
 from jaxveh.roads import LEVEL
 from jaxveh.vehicles.sets import commonroad_cars
 
@@ -35,7 +35,7 @@ GIVEN = {
 
 @pytest.mark.parametrize("name", CARS)
 def test_motion_is_that_recorded(name):
-    """Stirred, on level ground and on a rough one; slowly, nearly standing; hard to the left."""
+    """Stirred, on level ground and on a rough one; slowly, nearly standing; hard to the left; with no number that is 0 or 1."""
     car, (x, u) = made(name), stirred(name)
     slow = x._replace(**{n: 0.02 * getattr(x, n) for n in x._fields if n.startswith(("v_", "omega"))})
     slow_u = u._replace(**{n: 0.02 * getattr(u, n) for n in u._fields if n.startswith(("v_x", "speed"))})
@@ -49,10 +49,37 @@ def test_motion_is_that_recorded(name):
     for what, case in cases.items():
         rates, outputs = car.evaluate(0.0, *case)
         found[what] = {"rates": rates._asdict(), "outputs": outputs._asdict()}
+    rates, outputs = lively(car).evaluate(0.0, x, u, ROUGH)
+    found["lively"] = {"rates": rates._asdict(), "outputs": outputs._asdict()}
     if hasattr(car, "rear"):
         rates, outputs = uneven(car).evaluate(0.0, x, u, ROUGH)
         found["uneven"] = {"rates": rates._asdict(), "outputs": outputs._asdict()}
     check_recorded(__file__, name, found)
+
+
+OPTIONS = {
+    "not mirrored": ("SevenDOF", lambda car: dataclasses.replace(car, front=shifted_mf(), mirrored=False)),
+    "mirrored": ("SevenDOF", lambda car: dataclasses.replace(car, front=shifted_mf())),
+    "a share of the roll": ("SevenDOF", lambda car: dataclasses.replace(car, front_roll_share=0.7)),
+    "another road": ("Travelling", lambda car: dataclasses.replace(car, road=roads.Banked(0.1, -10.0, 40.0))),
+}
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_motion_by_other_options_is_that_recorded(option):
+    name, change = OPTIONS[option]
+    rates, outputs = change(made(name)).evaluate(0.0, *stirred(name), ROUGH)
+    check_recorded(__file__, f"option: {option}", {"rates": rates._asdict(), "outputs": outputs._asdict()})
+
+
+def test_every_number_and_option_of_a_car_has_an_effect_in_one_on_record():
+    cars = {name: made(name) for name in CARS}
+    changed = [change(cars[name]) for name, change in OPTIONS.values()]
+    steered_cars = [steered(kind, steering) for kind in ("SingleTrack", "TwoTrack3DOF") for steering in STEERINGS]
+    members = [*changed, *map(lively, cars.values()), *(make() for make in MAKERS.values()), *steered_cars]
+    of_one_function = {"front_roll_share", "mirrored"}  # which all cars call: SevenDOF stands for them
+    found = without_effect(members, "jaxveh.vehicles")
+    assert {name for name in found if name.partition(".")[2] not in of_one_function} == set()
 
 
 def test_long_laws_with_other_numbers_behind_move_as_recorded():
@@ -99,12 +126,11 @@ def test_numbers_of_cars_given_by_name_are_those_recorded(name):
 
 @pytest.mark.parametrize("name", vehicles.sets.CARS)
 def test_every_named_car_has_the_numbers_recorded(name):
-    """Its own, those of its file, and those that it has as a simple car, as one that rolls and as the fullest, where they
-    reach."""
+    """Its own, those of its file, and those that it has as every kind of vehicle that they reach."""
     found = {"own": vehicles.sets.CARS[name]()}
     with contextlib.suppress(InputError):  # no file can say what it is
         found["file"] = vehicles.specification_of(found["own"])
-    for fidelity in ("single-track", "roll-4dof", list(vehicles.sets.FIDELITIES)[-1]):
+    for fidelity in vehicles.sets.FIDELITIES:
         try:
             found[fidelity] = vehicles.named_car(name, fidelity)
         except InputError:  # its numbers do not reach
