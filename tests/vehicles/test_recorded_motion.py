@@ -61,6 +61,7 @@ OPTIONS = {
     "not mirrored": ("SevenDOF", lambda car: dataclasses.replace(car, front=shifted_mf(), mirrored=False)),
     "mirrored": ("SevenDOF", lambda car: dataclasses.replace(car, front=shifted_mf())),
     "a share of the roll": ("SevenDOF", lambda car: dataclasses.replace(car, front_roll_share=0.7)),
+    "crawling at a higher speed": ("SevenDOF", lambda car: dataclasses.replace(car, crawl_speed=40.0)),
     "another road": ("Travelling", lambda car: dataclasses.replace(car, road=roads.Banked(0.1, -10.0, 40.0))),
 }
 
@@ -77,7 +78,7 @@ def test_every_number_and_option_of_a_car_has_an_effect_in_one_on_record():
     changed = [change(cars[name]) for name, change in OPTIONS.values()]
     steered_cars = [steered(kind, steering) for kind in ("SingleTrack", "TwoTrack3DOF") for steering in STEERINGS]
     members = [*changed, *map(lively, cars.values()), *(make() for make in MAKERS.values()), *steered_cars]
-    of_one_function = {"front_roll_share", "mirrored"}  # which all cars call: SevenDOF stands for them
+    of_one_function = {"crawl_speed", "front_roll_share", "mirrored"}  # which all cars call: SevenDOF stands for them
     found = without_effect(members, "jaxveh.vehicles")
     assert {name for name in found if name.partition(".")[2] not in of_one_function} == set()
 
