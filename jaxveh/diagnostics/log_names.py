@@ -11,6 +11,12 @@ USUAL = ("v_x", "yaw_rate", "a_y", "steer")
 """The channels that the checks and the estimators of sideslip compare."""
 
 
+SPEEDS = ("wheel_speed_fl", "wheel_speed_fr", "wheel_speed_rl", "wheel_speed_rr")
+"""The channels from which a missing v_x is estimated."""
+
+WITH = "(--channels), with its unit and sign"
+"""The end of the advice to name a column."""
+
 MOST_LIKELY = 3
 """The number of channels that a finding names."""
 
@@ -25,10 +31,12 @@ def check_names(log: LogView) -> list[LogFinding]:
     for name in log.channels:
         meant = plain.get(_plain(name))
         if name not in CANONICAL and meant is not None and meant not in log.channels:
-            message = f"is not used: the name of this channel is {meant}. Rename it, or name it in a channel map (--channels)."
+            message = (
+                f"is not used: the name of this channel is {meant}. Rename it, or name it in a channel map {WITH}."
+            )
             findings.append(LogFinding("warning" if meant in USUAL else "note", name, message, {}))
     told = {finding.channel for finding in findings}
-    for wanted in USUAL:
+    for wanted in USUAL if "v_x" in log.channels else (*USUAL, *SPEEDS):
         alike = [name for name in kit.likely_names(wanted, log.channels) if name not in told]
         there = any(name in log.channels for name in (wanted, *INSTEAD.get(wanted, ())))
         if alike and not there and not told & set(kit.likely_names(wanted, log.channels)):
@@ -45,11 +53,8 @@ def check_names(log: LogView) -> list[LogFinding]:
 def _likely(wanted: str, alike: list[str]) -> LogFinding:
     """The finding that a channel is not there, while others look like it."""
     meant = "steer, or steering_wheel if it is the angle of the steering wheel" if wanted == "steer" else wanted
-    message = (
-        f"may be {meant}, which is not there under that name, and is not used: name it in a channel map (--channels), with its "
-        "unit and sign."
-    )
-    return LogFinding("warning", ", ".join(alike[:MOST_LIKELY]), message, {})
+    message = f"may be {meant}, which is not there under that name, and is not used: name it in a channel map {WITH}."
+    return LogFinding("warning" if wanted in USUAL else "note", ", ".join(alike[:MOST_LIKELY]), message, {})
 
 
 def _plain(name: str) -> str:

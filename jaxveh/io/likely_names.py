@@ -7,13 +7,15 @@ from collections.abc import Iterable
 
 from jaxveh.io.canonical import CANONICAL, canonical_unit
 
-MOST = 3
-"""The number of names that a message proposes for one channel."""
-
+MOST = 3  # names that a message proposes for one channel
 _ACCELERATION = r"(acc\w*|beschl\w*|g force|g)"
 _OF = lambda axis, letter: (
     rf"\b{axis} ?{_ACCELERATION}\b|\b{_ACCELERATION} ?{axis}\b|\b{axis}\w*beschl\w*|\b(acc\w*|a) ?{letter}\b|\b{letter} acc\w*\b"
 )
+_CORNERS = {
+    "fl": "fl|lf|vl|front left|left front", "fr": "fr|rf|vr|front right|right front",
+    "rl": "rl|lr|hl|rear left|left rear", "rr": "rr|hr|rear right|right rear",
+}  # fmt: skip
 _LIKELY = {
     "v_x": r"^v$|\bvx\b|^v (ego|veh\w*|car|x|lon\w*)\b|\b(speed|spd|vel\w*|\w*geschw\w*|linear x)\b",
     "yaw_rate": r"\b(yaw|gier|psi|heading) ?(rate|rt|vel\w*|speed|dot|p)\b|\b(gyro\w*|ang\w*( rate| vel\w*)?|rate|omega|g|w) ?z\b"
@@ -21,12 +23,18 @@ _LIKELY = {
     "a_y": _OF(r"(lat(eral)?|quer)", "y"),
     "a_x": _OF(r"(long(itudinal)?|lon|inline|l(ä|ae)ngs)", "x"),
     "steer": r"\b(steer\w*|lenk\w*|swa|sas)\b|\bstr( ?whl| ang)|^delta( (f|fl|front))?$",
+    **{
+        f"wheel_speed_{at}": rf"(?=.*\b(wheel\w*|whl\w*|w ?spd|wss|rad\w*)\b).*\b({corner})\b"
+        for at, corner in _CORNERS.items()
+    },
     "time": r"\b(time|zeit\w*|uhrzeit|timestamps?|stamp|millis|clock|elapsed|secs?|seconds)\b|^t$|^x value$",
 }
 """What the words of a name contain, by the known channel for which they stand."""
+_WHEEL = r"\b(torque|brake|pressure|temp\w*|load|force|slip|radius|angle|travel|susp\w*|steer\w*|moment\w*|acc\w*|camber|toe)\b"
 _OTHER = {
-    "v_x": r"\b(wheel|whl|rad|engine|motor|fan|wind|turbo\w*|shaft|ang\w*|yaw|giergeschw\w*|roll|pitch|lat\w*|quer\w*|vert\w*|"
-    r"y|z|north|east|down|[fr][lr]|steer\w*|lenk\w*|limit|gyro)\b",
+    **dict.fromkeys((f"wheel_speed_{at}" for at in _CORNERS), _WHEEL),
+    "v_x": r"\b(wheel\w*|whl\w*|w ?spd|wss|rad\w*|engine|motor|fan|wind|turbo\w*|shaft|ang\w*|yaw|giergeschw\w*|roll|pitch|"
+    r"lat\w*|quer\w*|vert\w*|y|z|north|east|down|[frvh][lr]|[lr][fr]|steer\w*|lenk\w*|limit|gyro)\b",
     "steer": r"\b(rate|speed|vel\w*|torque|force|moment\w*|current|assist|arm|status)\b",
 }
 _NO_MEASUREMENT = (
@@ -37,8 +45,7 @@ _UNITS = {
     "rad": {"deg": ("deg", "degs", "degree", "degrees", "grad"), "rad": ("rad", "rads", "radian", "radians")},
     "rad/s": {
         "deg/s": ("deg/s", "degs", "dps", "degps", "deg s", "deg sec", "deg per s", "deg"),
-        "rad/s": ("rads", "radps", "rad s", "rad sec", "rad per s", "rad"),
-        "rpm": ("rpm",),
+        "rad/s": ("rads", "radps", "rad s", "rad sec", "rad per s", "rad"), "rpm": ("rpm",),
     },
     "m/s": {"km/h": ("kmh", "kph", "kmph", "km h"), "mph": ("mph",), "knot": ("knots", "kts", "kt"), "m/s": ("mps", "ms", "m s")},
     "m/s^2": {"g": ("g", "gs"), "m/s^2": ("mps 2", "ms 2", "m s 2", "mpss")},

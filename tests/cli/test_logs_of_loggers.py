@@ -55,6 +55,9 @@ def test_names_of_others_are_proposed_for_what_is_not_there(tmp_path):
     assert "Ground Speed may be v_x. Gyro Z may be yaw_rate. Map their columns with --channels" in line
     with pytest.raises(InputError, match=r"it has: Ground Speed, .*\. Ground Speed may be v_x\. Name the columns"):
         estimators.kit.check_needs("mass", (estimators.kit.Need("v_x", "m/s"),), io.read_recording(path))
+    path = logger_file(tmp_path, names="Time,Wheel FL,Gyro Z,G Force Lat,Steered Angle")
+    assert "note Wheel FL may be wheel_speed_fl" in " ".join(run("check", path).stdout.split())
+    path = logger_file(tmp_path, names="Time,Ground Speed,Gyro Z,G Force Lat,Steered Angle")
     (tmp_path / "map.toml").write_text("[channels]\n" + 'speed = "Ground Speed"\nsteering_wheel = "Steered Angle"\n')
     checked = run("check", path, "--channels", tmp_path / "map.toml").stdout
     assert "may be" not in checked

@@ -16,11 +16,13 @@ NAMES = {
     "a_y": "G Force Lat, LatAcc, lateral_acc, Y_ACCELERATION, linear_acceleration.y, ay, accel_y, Querbeschleunigung",
     "a_x": "G Force Long, InlineAcc, longitudinal_acc, ax_mps2, LonAcc, Längsbeschleunigung, accx_can",
     "steer": "Steered Angle, SteeringWheelAngle, steeringAngleDeg, delta, StrWhlAng, Lenkradwinkel, SWA, steer_deg",
+    "wheel_speed_fl": "wheel_fl, WheelSpeedFL, ABS_WhlSpd_FL, Wheel Speed Front Left, wheel_fl_rps_meas, Radgeschw_VL, WSpd_LF",
+    "wheel_speed_rr": "wheel_rr, WheelSpeedRR, ABS_WhlSpd_RR, Wheel Speed Rear Right, wheel_rr_rps_meas, Radgeschw_HR",
     "time": "t_s, Device Time, elapsed_time, write_millis, %time, __time, header.stamp.secs, Zeit, timestamp_us",
 }  # fmt: skip
 OTHERS = (
-    "Engine RPM, Wheel Speed FL, Steering Arm Force, Fan Speed, wind speed, deltadelta, targetLateralAcceleration, steerCommand, "
-    "Fuel Level, device_update_rate, a_y_std, gps_accuracy, imu_gy_rps, roll rate, Boost, distance, Steering Torque"
+    "Engine RPM, Steering Arm Force, Fan Speed, wind speed, deltadelta, targetLateralAcceleration, steerCommand, "
+    "Brake Pressure Wheel FL, Fuel Level, device_update_rate, a_y_std, gps_accuracy, imu_gy_rps, roll rate, Boost, distance"
 )
 
 
