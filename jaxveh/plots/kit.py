@@ -1,6 +1,7 @@
 """Tools for further figures."""
 
 from jaxveh.plots.figure import Figure
+from jaxveh.plots.quantities import quantity
 from jaxveh.plots.style import CYCLE, PAGE_WIDTH, SHADE
 
 __all__ = [
@@ -8,4 +9,5 @@ __all__ = [
     "PAGE_WIDTH",
     "SHADE",
     "Figure",
+    "quantity",
 ]

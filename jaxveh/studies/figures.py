@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from jaxveh import plots
-from jaxveh.studies.summary import at_front, baseline_of, display_of, errors_of, label, plain_values, quartiles, ranks
+from jaxveh.studies.summary import at_front, baseline_of, errors_of, label, plain_values, quartiles, ranks
+from jaxveh.studies.words import shown_on_figure, words_for
 from jaxveh.sweeps import Axis, Swept
 
 MOST_PANELS = 6
@@ -51,7 +52,7 @@ def _of_value(found: Swept, name: str) -> Iterator[tuple[str, Any]]:
 
 def lines(found: Swept, name: str, axis: Axis, by: Axis | None = None) -> Any:
     """A value over an axis of numbers: median and quartiles over everything else, one line for each label of `by`."""
-    x = np.asarray(axis.labels, float) * display_of(found, axis.name).factor
+    x = np.asarray(axis.labels, float) * shown_on_figure(found, axis.name).factor
     figure = plots.kit.Figure(figsize=(plots.kit.PAGE_WIDTH, 3.0), layout="constrained")
     with plots.style():
         ax = figure.subplots()
@@ -65,7 +66,7 @@ def lines(found: Swept, name: str, axis: Axis, by: Axis | None = None) -> Any:
                 linestyle="--",
                 label="doing nothing",
             )
-        ax.set(xlabel=display_of(found, axis.name).label, ylabel=display_of(found, name).label)
+        ax.set(xlabel=shown_on_figure(found, axis.name).label, ylabel=shown_on_figure(found, name).label)
         if _is_wide(x):
             ax.set_xscale("log")
         _scale(ax, at_front(found, name, []), "y")
@@ -89,15 +90,15 @@ def heat_map(found: Swept, name: str, x: Axis, y: Axis, by: Axis | None = None) 
             ax.set_title(who, fontweight="normal")
             ax.grid(visible=False)
             for way, axis in (("x", x), ("y", y)):
-                ticks = [f"{value * display_of(found, axis.name).factor:.4g}" for value in axis.labels]
+                ticks = [f"{value * shown_on_figure(found, axis.name).factor:.4g}" for value in axis.labels]
                 ax.set(**{f"{way}ticks": np.arange(len(ticks)) + 0.5, f"{way}ticklabels": ticks})
         for ax in axes.flat[len(panels) :]:
             ax.set_visible(False)
         for ax in axes[-1]:
-            ax.set_xlabel(display_of(found, x.name).label)
+            ax.set_xlabel(shown_on_figure(found, x.name).label)
         for ax in axes[:, 0]:
-            ax.set_ylabel(display_of(found, y.name).label)
-        figure.colorbar(mesh, ax=axes, label=f"median {display_of(found, name).label}")
+            ax.set_ylabel(shown_on_figure(found, y.name).label)
+        figure.colorbar(mesh, ax=axes, label=f"median {shown_on_figure(found, name).label}")
     return figure
 
 
@@ -124,7 +125,7 @@ def violins(found: Swept, name: str, axis: Axis) -> Any:
         ax.set(
             xticks=range(len(ticks)),
             xticklabels=ticks,
-            ylabel=display_of(found, name).label,
+            ylabel=shown_on_figure(found, name).label,
             xlim=(-0.6, len(ticks) - 0.4),
         )
         if log:
@@ -149,7 +150,7 @@ def rank_bars(found: Swept, name: str, axis: Axis) -> Any:
         means = ["-" if np.isnan(mean) else f"{mean:.2f}" for mean in one.mean]
         names = [f"{one.labels[i]} ({means[i]})" for i in order]
         ax.set(yticks=range(len(order)), yticklabels=names, xlabel="share of runs [%]", xlim=(0, 100))
-        ax.set_title(f"ranks by {name}, mean in brackets", fontweight="normal")
+        ax.set_title(f"ranks by {words_for(name)}, mean in brackets", fontweight="normal")
         figure.legend(loc="outside lower center", ncols=min(len(order), 10), title="place")
     return figure
 
@@ -161,7 +162,7 @@ def over_samples(found: Swept, name: str, axis: Axis, by: Axis | None = None) ->
     with plots.style():
         axes = figure.subplots(-(-len(columns) // 2), min(2, len(columns)), squeeze=False, sharey=True)
         for ax, (part, numbers) in zip(axes.flat, columns.items(), strict=False):
-            said = display_of(found, f"{axis.name}.{part}")
+            said = shown_on_figure(found, f"{axis.name}.{part}")
             groups = np.array_split(np.argsort(numbers), min(BINS, len(numbers)))
             middle = np.array([np.median(numbers[group]) for group in groups]) * said.factor
             for i, (who, values) in enumerate(_series(found, name, by, axis)):
@@ -177,11 +178,11 @@ def over_samples(found: Swept, name: str, axis: Axis, by: Axis | None = None) ->
                 ax.fill_between(
                     middle, low, high, color=plots.kit.CYCLE[i % len(plots.kit.CYCLE)], alpha=0.15, linewidth=0
                 )
-            ax.set_xlabel(said.label.removeprefix(f"{axis.name}."))
+            ax.set_xlabel(said.label)
         for ax in axes.flat[len(columns) :]:
             ax.set_visible(False)
         _scale(axes[0, 0], at_front(found, name, []), "y")
-        axes[0, 0].set_ylabel(display_of(found, name).label)
+        axes[0, 0].set_ylabel(shown_on_figure(found, name).label)
         _told(axes[0, 0], "median and quartiles", by)
     return figure
 
@@ -217,4 +218,4 @@ def _scale(ax: Any, values: np.ndarray, way: str) -> None:
 def _told(ax: Any, title: str, by: Axis | None) -> None:
     ax.set_title(title, fontweight="normal")
     if ax.get_legend_handles_labels()[1]:
-        ax.legend(title=None if by is None else by.name)
+        ax.legend(title=None if by is None else words_for(by.name))

@@ -152,12 +152,12 @@ def test_large_designs_are_told_by_axes_alone():
 
 
 FIGURES = {
-    "rmse_sideslip_over_speed": ("speed [m/s]", "rmse.sideslip [°]"),
-    "rmse_sideslip_over_noise": ("noise [°/s]", "rmse.sideslip [°]"),
+    "rmse_sideslip_over_speed": ("speed [m/s]", "RMSE of sideslip [°]"),
+    "rmse_sideslip_over_noise": ("noise [°/s]", "RMSE of sideslip [°]"),
     "rmse_sideslip_map_speed_noise": ("speed [m/s]", "noise [°/s]"),
-    "rmse_sideslip_by_filter": ("", "rmse.sideslip [°]"),
+    "rmse_sideslip_by_filter": ("", "RMSE of sideslip [°]"),
     "rmse_sideslip_ranks_filter": ("share of runs [%]", ""),
-    "rmse_sideslip_over_samples": ("mass [kg]", "rmse.sideslip [°]"),
+    "rmse_sideslip_over_samples": ("mass [kg]", "RMSE of sideslip [°]"),
 }
 
 
