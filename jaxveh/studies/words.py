@@ -1,4 +1,4 @@
-"""The words of a sweep's axes and values on figures: of `car_mass` the mass, of `rmse.sideslip` the RMSE of sideslip."""
+"""The words of a sweep's axes and values on figures: of a mass its name, of an rmse of a quantity the RMSE of it."""
 
 from __future__ import annotations
 
