@@ -60,7 +60,7 @@ _UNITS = {
 
 
 def words_of(name: str) -> str:
-    """Return the words of a name in small letters: `steering wheel angle` of `steeringWheelAngle` and `STEERING_WHEEL_ANGLE`."""
+    """Return the words of a name in small letters: 'steering wheel angle' of 'steeringWheelAngle' and 'STEERING_WHEEL_ANGLE'."""
     apart = re.sub(r"(?<=[a-zä-ü0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name)
     return " ".join(re.findall(r"[^\W\d_]+|\d+", apart)).casefold()
 
