@@ -16,6 +16,8 @@ from jaxveh.io.naming import check_known
 SHOWN = 200
 """Largest number of characters of a value in a message."""
 
+_ELSEWHERE = ": `jaxveh schema` shows the files; io.read_commonroad reads YAML, `jaxveh tyre` .tir"
+
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the contents of a file; raise `InputError` with file and line if it is not TOML."""
@@ -26,11 +28,13 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: broken TOML: not UTF-8 text (byte {error.start}); save it as UTF-8.") from error
     try:
         return tomllib.loads(text)
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # also integers that are too large, and lists that are nested too deeply, for Python
-        raise InputError(f"{path}: broken TOML: {error}{_line(text, str(error))}.") from error
+    except (ValueError, RecursionError) as error:  # also integers too large, and lists too deep, for Python
+        other = (
+            ""
+            if path.suffix.lower() == ".toml"
+            else f" (or no TOML at all, as {path.suffix or 'its name'} suggests{_ELSEWHERE})"
+        )
+        raise InputError(f"{path}: broken TOML{other}: {error}{_line(text, str(error))}.") from error
 
 
 def _line(text: str, told: str) -> str:

@@ -193,3 +193,13 @@ def test_a_mistyped_line_is_shown(tmp_path, line):
     path.write_bytes(f"{line}\n".encode("utf-16"))
     with pytest.raises(InputError, match="not UTF-8 text .*; save it as UTF-8"):
         io.read_car(path)
+
+
+@pytest.mark.parametrize("suffix", [".yaml", ".xml", ".json", ".tir", ""])
+def test_a_car_in_another_format_is_told_what_reads_it(tmp_path, suffix):
+    path = tmp_path / f"car{suffix}"
+    path.write_text("m: 1093.3\nI_z: 1791.6\n")
+    with pytest.raises(
+        InputError, match=rf"or no TOML at all, as {suffix or 'its name'} suggests: .* io.read_commonroad reads YAML"
+    ):
+        io.read_car(path)
