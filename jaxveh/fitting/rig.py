@@ -17,6 +17,7 @@ from jaxveh._core.errors import (
     check_at_least,
     check_flags,
     check_kind,
+    check_on_host,
     check_one_of,
     check_positive,
     check_whole,
@@ -137,7 +138,7 @@ def fit_rig(
     forces, too few rows, rows in which no slip varies, bad `folds` or `max_steps`;
     `FilterError` if the joint fit does not converge, unless `throw=False`.
     """
-    _check_settings(max_steps, tolerance, folds, progress, robust=robust, staged=staged, throw=throw)
+    _check_settings(law, max_steps, tolerance, folds, progress, robust=robust, staged=staged, throw=throw)
     data, plan, aside = _prepare(law, rig, where, free, prior, measured, weights, bounds, robust, max_steps, tolerance)
     parts = fold_of(rig, folds) if folds else np.full(rig.load.shape, -1)
     joint = _joint(data)
@@ -160,7 +161,8 @@ def fit_rig(
     return _result(data, tyre, joint, settled.held, tuple(reports), data.rmse(law), validation)
 
 
-def _check_settings(max_steps: int, tolerance: float, folds: int, progress: Progress, **flags: Any) -> None:
+def _check_settings(law: Any, max_steps: int, tolerance: float, folds: int, progress: Progress, **flags: Any) -> None:
+    check_on_host("fit_rig", law)
     check_flags(**flags)
     check_at_least("max_steps", max_steps, 1)
     check_at_least("tolerance", tolerance, 0)

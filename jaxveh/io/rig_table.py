@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_one_of, path_of
+from jaxveh._core.errors import InputError, check_on_host, check_one_of, path_of
 from jaxveh._core.names import as_several
 from jaxveh.io.csv_log import read_columns
 from jaxveh.io.files import check_readable, check_suffix
@@ -93,6 +93,7 @@ class RigTable(RigShown):
     def __post_init__(self):
         for name in COLUMNS:
             if (values := getattr(self, name)) is not None:
+                check_on_host(f"RigTable.{name}", values)
                 object.__setattr__(self, name, np.asarray(values, dtype=np.float64))
         self._check_shapes()
         for name in (*INPUTS, "run"):

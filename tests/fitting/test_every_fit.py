@@ -5,6 +5,7 @@ A new fit is one line in `CASES`: its problem, its program on the same problem, 
 What compiles is shared: one `fitting.solve` a case, at the case's tolerance, and one linearisation for derivatives in both modes.
 """
 
+import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -311,3 +312,67 @@ def test_a_prior_is_a_number_or_numbers_by_name(case, problem, prior, message):
         *(jax.tree.leaves(eqx.filter(p, eqx.is_array)) for p in (by_name, case.pose(0.4))), strict=True
     ):
         np.testing.assert_array_equal(one, other)
+
+
+RIG = a_rig()
+REFUSED = {
+    "fit_rig": lambda value: fitting.fit_rig(
+        dataclasses.replace(a_law(), friction=value), RIG, where=FRICTION, prior=0.02
+    )
+}
+"""Programs that run on the host, as a function of a number."""
+
+
+TRACED = {
+    "multiple_shooting": lambda: (
+        jnp.asarray(PIECES[0]["rate"]),
+        lambda rate: fitting.multiple_shooting(
+            plain(),
+            [PIECES[0].replace(rate=rate), PIECES[1]],
+            PENDULUM,
+            prior=0.5,
+            window=1.0,
+            tie=0.1,
+            tolerance=1e-12,
+        ),
+    ),
+    "maximum_likelihood": lambda: (
+        jnp.asarray(YEARS["flow"]),
+        lambda flow: fitting.maximum_likelihood(
+            FILTER, nile(), YEARS.replace(flow=flow), LEVELS, prior=0.3, tolerance=1e-10
+        ),
+    ),
+    "prediction_error": lambda: (
+        jnp.asarray(YEARS["flow"]),
+        lambda flow: fitting.prediction_error(
+            FILTER, nile(), YEARS.replace(flow=flow), LEVELS, prior=0.3, tolerance=1e-10
+        ),
+    ),
+}
+"""Programs that work under jit, vmap and grad: data, and the fit as a function of them."""
+
+
+def test_every_program_is_traced_or_refused():
+    assert {*REFUSED, *TRACED} == set(FITS)
+
+
+@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize("how", [jax.jit, jax.grad, jax.jacfwd], ids=lambda how: how.__name__)
+def test_a_program_of_the_host_says_what_to_do_under_a_transformation(name, how):
+    with pytest.raises(InputError, match=rf"{name}: is given numbers that jit.*fitting\.solve"):
+        how(lambda value: REFUSED[name](value).cost)(0.9)
+    with pytest.raises(InputError, match=r"RigTable\.F_y: is given numbers that jit.*tree_at"):
+        how(lambda value: dataclasses.replace(RIG, F_y=value * jnp.asarray(RIG.F_y)).load.sum())(0.9)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", TRACED)
+def test_a_program_s_fit_has_the_slope_of_differences(name):
+    at, fit = TRACED[name]()
+    of = lambda data: fit(data).unconstrained
+    way = jnp.asarray(np.random.default_rng(0).normal(size=at.shape)) * jnp.std(at)
+    _, slope = jax.jit(lambda data: jax.jvp(of, (data,), (way,)))(at)
+    h = 1e-3
+    np.testing.assert_allclose(slope, (of(at + h * way) - of(at - h * way)) / (2 * h), rtol=2e-3, atol=1e-6)
+    backward = jax.grad(lambda data: of(data)[0])(at)
+    np.testing.assert_allclose(jnp.sum(backward * way), slope[0], rtol=1e-6)
