@@ -141,6 +141,8 @@ def word_for(value) -> str:
         return repr(value)
     if isinstance(value, type):
         return f"the class {value.__name__}"
+    if isinstance(value, jax.Array) and jax.numpy.issubdtype(value.dtype, jax.dtypes.prng_key):
+        return "a key of jax.random"
     if isinstance(value, jax.Array | np.ndarray):
         return f"an array of {value.dtype} of shape {value.shape}"
     if hasattr(value, "_fields"):

@@ -1,5 +1,6 @@
 """A thing of a wrong kind is shown in the same words, `word_for`, wherever a message names it."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -11,11 +12,14 @@ from jaxveh.kit import record_type
 
 X = record_type("X", ("p", "v"))
 THINGS = {
-    "None": None, "a truth value": True, "a number": 2.5, "text": "text", "a list": [1.0], "a class": X, "a record": X(1.0, 2.0),
+    "None": None, "a truth value": True, "a number": 2.5, "text": "text", "a list": [1.0], "a class": X,
+    "a key": jax.random.key(0),
+    "a record": X(1.0, 2.0),
     "an array": np.ones(3), "an array of jax": jnp.ones((2, 1)), "a function": np.linalg.norm, "a mapping": {"p": 1.0},
 }  # fmt: skip
 WORDS = {
     "None": "None", "a truth value": "True", "a number": "2.5", "text": "'text'", "a list": "list", "a class": "the class X",
+    "a key": "a key of jax.random",
     "a record": "X(p, v)", "an array": "an array of float64 of shape (3,)",
     "an array of jax": "an array of float64 of shape (2, 1)",    "a function": "the function norm", "a mapping": "dict",
 }  # fmt: skip

@@ -23,8 +23,8 @@ def linear():
     [
         ("esc", "'esc'"),
         ((sensors.IMU(rate=100.0),), "tuple"),
-        (jax.random.key(0), "PRNGKeyArray"),
-        (sensors.esc, "esc"),
+        (jax.random.key(0), "a key of jax.random"),
+        (sensors.esc, "the function esc"),
     ],
 )
 def test_sensors_that_are_none_are_refused(given, shown):
@@ -47,7 +47,9 @@ def test_a_drive_that_fits_into_no_memory_is_refused(given):
 
 
 def test_an_event_that_is_none_is_refused():
-    with pytest.raises(InputError, match=r"until = standstill: must be an Event such as simulation\.standstill\(\)"):
+    with pytest.raises(
+        InputError, match=r"until = the function standstill: must be an Event such as simulation\.standstill\(\)"
+    ):
         simulate(linear(), STEER, until=simulation.standstill)
 
 
