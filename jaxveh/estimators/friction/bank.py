@@ -34,6 +34,12 @@ than this count as one."""
 NEAR = 0.18232
 """ln 1.2: a friction is known if it is probably within this range around the median."""
 
+OUTLIER = 9.0
+"""Largest squared innovation over its predicted variance that counts for the misfit: that of three standard deviations."""
+
+FIRST = 0.5
+"""s: for how long the first misfit counts as learnt."""
+
 
 class Bank(NamedTuple):
     """Logarithms of the weights (K,), each filter's mean (K, 8) and covariance (K, 8, 8)."""
@@ -43,14 +49,23 @@ class Bank(NamedTuple):
     covariances: Any
 
 
+class Misfit(NamedTuple):
+    """By how much the variances of yaw rate and a_y are larger than the method's, `times` (2,), at least 1; and from how many
+    seconds this was learnt, `seconds` (2,)."""
+
+    times: Any
+    seconds: Any
+
+
 class BankMemory(NamedTuple):
     """The last motion, `told`; the filters, `bank`; the memory of the wheel slips, `along` (None for a file without the wheels'
-    radius and inertia); and for how long the friction has been certain, `certain` (s)."""
+    radius and inertia); for how long the friction has been certain, `certain` (s); and the `misfit` of the predictions."""
 
     told: Told
     bank: Bank
     along: Any
     certain: Any
+    misfit: Misfit
 
 
 class FrictionBank(AbstractMethod):
@@ -71,15 +86,18 @@ class FrictionBank(AbstractMethod):
 
     `frictions` (K,) of the filters and `prior` (K,), their probabilities without information; `jumps` (1/s): rate of jumps to any
     friction; `walk` (1/sqrt(s)): random walk of ln mu; `turn_time`, `force_time` (s): innovations of yaw rate and of a_y closer
-    than this count as one; `stiffness_spread` (-) of an axle's slope, which changes within `stiffness_time` (s);
-    `steer_noise` (rad), play included, and `offset_spread` (rad), the standard deviation of an offset that stays; `v_y_noise`
-    (m/s^1.5), `yaw_noise` (rad/s^1.5): model errors; `a_y_noise` (m/s^2) and `force_noise` (-), a share of the measured a_y;
-    `yaw_rate_noise` (rad/s).
+    than this count as one; `learn_time` (s): memory of the misfit; `stiffness_spread` (-) of an axle's slope, which changes
+    within `stiffness_time` (s); `steer_noise` (rad), play included, and `offset_spread` (rad), the standard deviation of an
+    offset that stays; `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5): model errors; `a_y_noise` (m/s^2) and `force_noise` (-), a
+    share of the measured a_y; `yaw_rate_noise` (rad/s).
 
     The weights are no exact likelihoods: all frictions share one innovation variance, because separate ones would favour low
-    friction wherever the noise is overestimated. The standard deviation therefore depends on noises that were chosen on simulated
-    cars and one real log; it is too large on some cars and too small on others. A known friction stays known for up to a few
-    seconds after a jump without excitation.
+    friction wherever the noise is overestimated. Where innovations are larger than predicted, on a rough road or with noisy
+    sensors, the variances of `yaw_rate_noise` and `a_y_noise` are multiplied by a `misfit` that follows the squared innovations
+    over their predicted variances (R. Mehra 1970). It is never below 1: small innovations in gentle driving do not show that the
+    model holds near the limit. The standard deviation depends on noises that were chosen on simulated cars and one real log; it
+    is too large on some cars and too small on others. A known friction stays known for up to a few seconds after a jump without
+    excitation.
     """
 
     car: PlanarCar
@@ -89,14 +107,15 @@ class FrictionBank(AbstractMethod):
     walk: jax.Array = positive("1/sqrt(s)", default=0.03)
     turn_time: jax.Array = positive("s", default=0.011)
     force_time: jax.Array = positive("s", default=0.03)
+    learn_time: jax.Array = positive("s", default=20.0)
     certainty: jax.Array = parameter("-", scale=0.1, default=0.97)
     certain_time: jax.Array = positive("s", default=0.5)
     stiffness_spread: jax.Array = positive("-", default=0.2)
     stiffness_time: jax.Array = positive("s", default=200.0)
     steer_noise: jax.Array = positive("rad", default=0.0007)
     offset_spread: jax.Array = positive("rad", default=0.004)
-    v_y_noise: jax.Array = positive("m/s^1.5", default=0.1)
-    yaw_noise: jax.Array = positive("rad/s^1.5", default=0.02)
+    v_y_noise: jax.Array = positive("m/s^1.5", default=0.15)
+    yaw_noise: jax.Array = positive("rad/s^1.5", default=0.012)
     a_y_noise: jax.Array = positive("m/s^2", default=0.1)
     force_noise: jax.Array = positive("-", default=0.03)
     yaw_rate_noise: jax.Array = positive("rad/s", default=0.004)
@@ -109,14 +128,15 @@ class FrictionBank(AbstractMethod):
     def first(self, t, values):
         bank = Bank(jnp.log(self._prior()), *self._start())
         along = None if self.along is None else self.along.start(t)
-        return self._said(BankMemory(start_told(t, values), bank, along, jnp.zeros_like(t)), 0.0)
+        misfit = Misfit(jnp.ones((2,), t.dtype), jnp.full((2,), FIRST, t.dtype))
+        return self._said(BankMemory(start_told(t, values), bank, along, jnp.zeros_like(t), misfit), 0.0)
 
     def next(self, memory, t, values):
         dt = jnp.clip(t - memory.told.t, 0.0, 1.0)
         told = next_told(memory.told, t, values)
         bank = self._mix(memory.bank, dt)
         moved = self._move(bank, told, dt)
-        moved, likelihoods = self._correct(moved, told, values, dt)
+        moved, likelihoods, misfit = self._correct(moved, told, values, dt, memory.misfit)
         weights = bank.weights + likelihoods + self._carried(told, values["a_y"], dt)
         along = None
         if self.along is not None:
@@ -129,7 +149,8 @@ class FrictionBank(AbstractMethod):
             keep(moved.means, means),
             keep(moved.covariances, covariances),
         )
-        return self._said(BankMemory(told, bank, along, memory.certain), dt)
+        misfit = jax.tree.map(keep, misfit, memory.misfit)
+        return self._said(BankMemory(told, bank, along, memory.certain, misfit), dt)
 
     def _prior(self):
         return self.prior / jnp.sum(self.prior)
@@ -215,11 +236,12 @@ class FrictionBank(AbstractMethod):
         means, covariances = jax.vmap(one)(bank.means, bank.covariances, self.frictions)
         return Bank(bank.weights, means, covariances)
 
-    def _correct(self, bank: Bank, told: Told, values, dt):
+    def _correct(self, bank: Bank, told: Told, values, dt, misfit: Misfit):
+        """The bank after this row, the logarithms (K,) of its likelihoods, and the new misfit."""
         a_y = values["a_y"]
         rough = jnp.square(self.a_y_noise) + jnp.square(self.force_noise * jnp.where(jnp.isnan(a_y), 0.0, a_y))
-        measured = (values["yaw_rate"], a_y)
-        noises = (jnp.square(self.yaw_rate_noise), rough)
+        measured = jnp.stack([values["yaw_rate"], a_y])
+        noises = misfit.times * jnp.stack([jnp.square(self.yaw_rate_noise), rough])
 
         def one(x, P, friction):
             said = []
@@ -231,12 +253,18 @@ class FrictionBank(AbstractMethod):
             return x, P, said
 
         means, covariances, said = jax.vmap(one)(bank.means, bank.covariances, self.frictions)
-        likelihoods = jnp.zeros_like(self.frictions)
+        before = jnp.exp(bank.weights)
+        likelihoods, ratios = jnp.zeros_like(self.frictions), []
         for (error, variance), time in zip(said, (self.turn_time, self.force_time), strict=True):
             # One variance for all: where noises are a guess, a less certain prediction is not less likely.
-            common = jnp.sum(jnp.exp(bank.weights) * variance)
-            likelihoods = likelihoods - 0.5 * (1.0 - jnp.exp(-dt / time)) * jnp.square(error) / common
-        return Bank(bank.weights, means, covariances), likelihoods
+            squares = jnp.square(error) / jnp.sum(before * variance)
+            likelihoods = likelihoods - 0.5 * (1.0 - jnp.exp(-dt / time)) * squares
+            ratios.append(jnp.minimum(jnp.sum(before * squares), OUTLIER))
+        seconds = jnp.minimum(misfit.seconds + dt, self.learn_time)
+        times = misfit.times * (1.0 + jnp.minimum(dt / seconds, 1.0) * (jnp.stack(ratios) - 1.0))
+        learnt = Misfit(jnp.maximum(times, 1.0), seconds)
+        learnt = jax.tree.map(lambda new, old: jnp.where(jnp.isnan(measured), old, new), learnt, misfit)
+        return Bank(bank.weights, means, covariances), likelihoods, learnt
 
     def _carried(self, told: Told, a_y, dt):
         """Logarithms (K,) of how likely each friction carries the accelerations of this row."""
