@@ -114,7 +114,7 @@ class FrictionBank(AbstractMethod):
     stiffness_time: jax.Array = positive("s", default=200.0)
     steer_noise: jax.Array = positive("rad", default=0.0007)
     offset_spread: jax.Array = positive("rad", default=0.004)
-    v_y_noise: jax.Array = positive("m/s^1.5", default=0.15)
+    v_y_noise: jax.Array = positive("m/s^1.5", default=0.1)
     yaw_noise: jax.Array = positive("rad/s^1.5", default=0.012)
     a_y_noise: jax.Array = positive("m/s^2", default=0.1)
     force_noise: jax.Array = positive("-", default=0.03)
