@@ -133,7 +133,10 @@ class AbstractFilter(Checked, eqx.Module):
 
 
 def _judged(belief: Any, info: Info) -> tuple[Any, Info]:
-    """A belief and its info, whose infinite log-likelihood is a result code. NaN says that there is none, as of observers."""
+    """A belief and its info, whose infinite log-likelihood is a result code. NaN says that there is none, as of observers; an info
+    of a user's own may have neither."""
+    if not {"log_likelihood", "result"} <= set(info._fields):
+        return belief, info
     infinite = jnp.isinf(info.log_likelihood)
     judged = likelihood_result(info.result, jnp.where(infinite, info.log_likelihood, 0.0))
     return belief, info._replace(result=judged)
