@@ -31,6 +31,7 @@ from jaxveh.fitting.problem import SearchEnd, by_name, on_line, scalar_parameter
 from jaxveh.fitting.result import AbstractFit
 from jaxveh.fitting.rig_data import RigData, Settings, StageReport, fold_of, rms
 from jaxveh.fitting.rig_identify import settle, without
+from jaxveh.fitting.rig_in_turn import fit_in_turn
 from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, offered_forces, spread_of
 from jaxveh.fitting.rig_robust import inflation
 from jaxveh.fitting.rig_stages import HELD_COEFFICIENTS, Stage, stages_of
@@ -121,6 +122,7 @@ def fit_rig(
 
     MF-Tyre is fitted in stages (pure slip, combined slip, moments) over the coefficients that the data show (those of load
     where the load varies, and so on), then all together; other laws at once. `where` picks coefficients of the law instead.
+    A table with more than 10,000 rows is fitted in some of them first, 3,000 in each stage, drawn at random, and then in all.
 
     `free`: names of coefficients to fit that are held by default (`lateral.PKY4`, the form of the cornering stiffness over
     load, stays at the law's value, 2 in a typical one). Coefficients that the data do not identify stay at their start.
@@ -144,11 +146,7 @@ def fit_rig(
     joint = _joint(data)
     plan = [*(plan if staged else ()), without(joint, _held_mask(data, aside), data.names)]
     total = len(plan) + folds
-    tyre, reports = law, []
-    for k, stage in enumerate(plan):
-        progress(k, total, stage.name)
-        tyre, report = data.fit(tyre, stage)
-        reports.append(report)
+    tyre, reports = fit_in_turn(data, law, plan, lambda k, name: progress(k, total, name))
     settled = settle(data, law, tyre, joint, aside, reports[-1])
     tyre, reports[-1] = settled.tyre, settled.report
     plan = [without(stage, settled.held, data.names) for stage in plan]
@@ -253,10 +251,7 @@ def _missed_residuals(data, law, plan, parts, told):
 
 def _unseen_residuals(data: RigData, law: AbstractTyre, plan: list[Stage], rows: np.ndarray) -> np.ndarray:
     """Residuals (m, n) of a fit from the same start that leaves out some rows."""
-    rest = data.without(rows)
-    for stage in plan:
-        if (rest.present[[data.channels.index(name) for name in stage.channels]] & stage.rows).any():
-            law, _ = rest.fit(law, stage)
+    law, _ = fit_in_turn(data.without(rows), law, plan, lambda k, name: None)
     return data.residuals(law)
 
 

@@ -15,7 +15,7 @@ from jaxveh._core.bijectors import Interval
 from jaxveh._core.errors import InputError, check_at_least, check_positive
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, resolve
-from jaxveh.fitting.rig_problem import PULL, Descent, RigProblem, descend, start_of
+from jaxveh.fitting.rig_problem import PULL, Descent, RigProblem, contact_of, descend, start_of
 from jaxveh.fitting.rig_robust import TO_DEVIATION
 from jaxveh.fitting.rig_stages import Stage
 from jaxveh.io import RigTable
@@ -103,6 +103,14 @@ class RigData:
         rest.present = self.present & ~rows
         return rest
 
+    def take(self, rows: np.ndarray) -> RigData:
+        """Some `rows` (indices) of the same data, with the peaks of all."""
+        some = copy.copy(self)
+        some.rig = self.rig.take(rows)
+        some.contact = contact_of(some.rig)
+        some.measured, some.present = self.measured[:, rows], self.present[:, rows]
+        return some
+
     def parameters(self, law: AbstractTyre) -> tuple[Parameter, ...]:
         """The fitted parameters, with their bounds."""
         found = resolve(law, lambda law: [leaf_of(law, name) for name in self.names])
@@ -168,16 +176,17 @@ class RigData:
     def share(self, law: AbstractTyre, stage: Stage) -> float:
         """RMS of the stage's residuals over their channels' peaks."""
         peaks = np.array([[self.peak[name]] for name in self.channels])
-        rows = np.where(self._counts(stage), self.residuals(law), np.nan) / peaks
+        rows = np.where(self.counts(stage), self.residuals(law), np.nan) / peaks
         return float(np.sqrt(np.nanmean(rows**2)))
 
     def loss(self, law: AbstractTyre, stage: Stage, noise: Mapping[str, float]) -> float:
         """The minimised loss of the stage, comparable between laws for the same noise; infinite where a force is not finite."""
         problem = self.problem(law, stage, noise)
-        bent = problem.bend(problem.weight * jnp.asarray(np.where(self._counts(stage), self.residuals(law), 0.0)))[0]
+        bent = problem.bend(problem.weight * jnp.asarray(np.where(self.counts(stage), self.residuals(law), 0.0)))[0]
         return float(np.nan_to_num(jnp.sum(problem.emphasis[:, None] * bent**2), nan=np.inf))
 
-    def _counts(self, stage: Stage) -> np.ndarray:
+    def counts(self, stage: Stage) -> np.ndarray:
+        """Which measurements (m, n) count in a stage."""
         return self.present & stage.rows & np.array([[name in stage.channels] for name in self.channels])
 
     def fit(self, law: AbstractTyre, stage: Stage) -> tuple[AbstractTyre, StageReport]:
@@ -190,7 +199,7 @@ class RigData:
         best = min([law, *ends], key=lambda end: self.loss(end, stage, noise))
         if best is not law:
             law, steps, converged = self.descend(best, stage)
-        rows = int(np.sum(self._counts(stage).any(axis=0)))
+        rows = int(np.sum(self.counts(stage).any(axis=0)))
         report = StageReport(
             stage.name, rows, len(stage.coefficients), before, self.share(law, stage), steps, converged
         )

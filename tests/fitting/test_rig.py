@@ -9,8 +9,10 @@ from rig_sweeps import brush, measured_of, peak, small_plan, table
 
 from jaxveh import fitting, tyres
 from jaxveh._core.errors import FilterError, InputError
-from jaxveh.fitting.rig_data import fold_of
+from jaxveh.fitting.rig_data import RigData, Settings, fold_of
+from jaxveh.fitting.rig_in_turn import MANY, SOME, some_rows
 from jaxveh.fitting.rig_problem import contact_of
+from jaxveh.fitting.rig_stages import Stage
 
 CHANNELS = ("F_x", "F_y", "M_z")
 COLUMNS, RUN = small_plan()
@@ -149,6 +151,29 @@ def test_cross_validation_is_worse_than_the_fit_and_better_than_the_start(clean)
     share = lambda rmse: np.sum([(rmse[name] / fit.noise[name]) ** 2 for name in CHANNELS])
     assert share(fit.rmse) < share(fit.cross_validation) < 1.1 * share(fit.rmse) < share(fit.start_rmse)
     assert np.isnan(list(fitting.fit_rig(start(), rig(clean)).cross_validation.values())).all()
+
+
+def test_a_long_table_is_fitted_in_some_of_its_rows_and_then_in_all():
+    columns, run = small_plan(points=1500)
+    data = table(measured_of(brush(), columns, CHANNELS), columns, run, 0.02, 1)
+    assert MANY < data.load.size < 2 * MANY
+    fit = fitting.fit_rig(start(), data)
+    some, everything = fit.stages
+    assert some.rows == SOME and everything.rows == data.load.size
+    # The end is that of all rows at once, and each standard error that of all.
+    once = fitting.fit_rig(fit.tyre, data, staged=False)
+    std = fit.parameters_std.array()
+    np.testing.assert_allclose(fit.parameters.array(), once.parameters.array(), atol=1e-2 * std.min(), rtol=1e-6)
+    assert np.all(np.abs(fit.parameters.array() - TRUE) < 4.0 * std)
+    # No row is preferred: whatever repeats in the table, the rows drawn have their share of it.
+    _, drawn = np.unique(run[some_rows_of(data)], return_counts=True)
+    assert 0.6 * SOME / len(drawn) < drawn.min() <= drawn.max() < 1.4 * SOME / len(drawn)
+
+
+def some_rows_of(data):
+    """The rows in which a fit of a long table begins."""
+    parts = RigData(data, contact_of(data), CHANNELS, ("friction",), Settings({}, {}, False, 1, 1e-6))
+    return some_rows(parts, [Stage("joint", CHANNELS, ("friction",), np.ones(data.load.shape, bool))])
 
 
 def test_folds_are_whole_runs_or_blocks(clean):
