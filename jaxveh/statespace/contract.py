@@ -133,8 +133,8 @@ class AbstractFilter(Checked, eqx.Module):
 
 
 def _judged(belief: Any, info: Info) -> tuple[Any, Info]:
-    """A belief and its info, whose infinite log-likelihood is a result code. NaN says that there is none, as of observers; an info
-    of a user's own may have neither."""
+    """A belief and its info, whose infinite log-likelihood is a result code. NaN says that there is none, as of observers; info
+    of a user's own filter may lack both."""
     if not {"log_likelihood", "result"} <= set(info._fields):
         return belief, info
     infinite = jnp.isinf(info.log_likelihood)
