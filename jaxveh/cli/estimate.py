@@ -208,7 +208,7 @@ def _estimate(choice: Choice, several: SeveralLogs) -> tuple[Any, dict[str, Any]
         report(1, 1, "scoring")
     say_source(choice, found, reason, len(fitted_on))
     pairs = {log: (jobs[log], one) for log, one in estimates.items()}
-    numbers = several.each(lambda pair: _conclude(choice, *pair, found, car), pairs)
+    numbers = several.each(lambda pair: _conclude(choice, pair[0], pair[1], found, car), pairs)
     if choice.report is not None and numbers:
         source = source_in_words(choice, found, reason, len(fitted_on))
         _report(choice, several, [(*pairs[log], one) for log, one in numbers.items()], found, car, source)
