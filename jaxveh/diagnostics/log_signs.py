@@ -60,28 +60,31 @@ def _wheels_over_speed(log: LogView) -> float | None:
 def check_signs(log: LogView) -> list[LogFinding]:
     """Check whether the signs of steer, yaw rate and lateral acceleration agree, and the accelerations follow the speeds."""
     findings = []
+    wheels = _wheels_over_speed(log)
+    confirmed = wheels is not None and _SAME[0] < wheels < _SAME[1]
     steering = _correlation(log) if log.has("steer", "yaw_rate", "v_x") else None
     lateral = _lateral(log) if log.has("v_x", "yaw_rate", "a_y") else None
     if steering is not None:
         findings.append(_steering(steering, _correlation(log, GENTLE), lateral))
     if lateral is not None:
         slides = _slides(lateral, _lateral(log, GENTLE)) or _turns_quickly(log, lateral)
-        findings.append(slides or _if_slow(log, _slope("a_y", "v_x yaw_rate", lateral, _LATERAL, "yaw_rate or a_y")))
+        told = slides or _if_slow(log, _slope("a_y", "v_x yaw_rate", lateral, _LATERAL, "yaw_rate or a_y"))
+        findings.append(_refuted(told, "a_y", "v_x yaw_rate") if confirmed else told)
     if log.has("v_x", "v_y", "yaw_rate", "a_y"):
         findings += _sideways(log)
     if log.has("v_x", "a_x"):
-        findings.append(_slope("a_x", "dv_x/dt", _longitudinal(log), _LONGITUDINAL, "a_x"))
-    wheels = _wheels_over_speed(log)
-    if wheels is not None and _SAME[0] < wheels < _SAME[1]:
-        # Accelerations that were planned, not measured, must not refute a speed that the wheels confirm.
-        return [_refuted(one) if one.severity == "error" and one.channel == "v_x" else one for one in findings]
+        told = _slope("a_x", "dv_x/dt", _longitudinal(log), _LONGITUDINAL, "a_x")
+        findings.append(_refuted(told, "a_x", "dv_x/dt") if confirmed else told)
     return findings
 
 
-def _refuted(finding: LogFinding) -> LogFinding:
-    """A finding that v_x is in another unit, of a log in which the wheels say that it is not."""
-    name, story, *_ = finding.message.removeprefix("disagrees with ").split(", ")
-    message = f"{story.removeprefix('which ')}, but the wheels confirm v_x: was it planned, not measured, or is its scale wrong?"
+def _refuted(finding: LogFinding, name: str, other: str) -> LogFinding:
+    """The finding of a comparison in a log whose wheels confirm v_x: an acceleration that was planned, not measured, must not
+    make an error of it."""
+    if finding.severity != "error" or finding.channel != "v_x":
+        return finding
+    story = _story(other, finding.values["slope"], finding.values["intercept"])
+    message = f"{story}, but the wheels confirm v_x: was it planned, not measured, or is its scale wrong?"
     return finding._replace(severity="warning", channel=name, message=message)
 
 
@@ -211,10 +214,14 @@ def _with_sideslip(log: LogView, arm: float, inertia: float) -> float | None:
     return float(slope) if is_one(slope) and softness > 0.0 and correlation > SCALED else None
 
 
+def _story(other: str, slope: float, intercept: float) -> str:
+    return f"is {slope:.3g} times {other} {'+' if intercept >= 0 else '-'} {abs(intercept):.2g} m/s^2"
+
+
 def _slope(name: str, other: str, line: tuple[float, float, float], table: dict, blamed: str) -> LogFinding:
     slope, intercept, correlation = line
     values = {"slope": slope, "intercept": intercept, "correlation": correlation}
-    story = f"is {slope:.3g} times {other} {'+' if intercept >= 0 else '-'} {abs(intercept):.2g} m/s^2"
+    story = _story(other, slope, intercept)
     if correlation < AGREE:
         message = (
             f"{story}, but hardly follows it (correlation {correlation:.2f}): too little motion to compare, or noise."

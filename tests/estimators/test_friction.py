@@ -238,9 +238,9 @@ def test_sensors_noisier_than_the_method_expects_make_no_friction_known(times, m
     memory, said, std, known = friction_of_noisy_sensors(times)
     assert not known.any()
     assert np.mean(np.square((said - 1.0) / std)[T[1:] > 3.0]) < 1.0
-    # The misfit is the ratio of the variances, and one where there is nothing to explain.
+    # The misfit is the ratio of the variances, of a_y less what the filters' own variance explains, and one without noise.
     for learnt, more in zip(np.asarray(memory.misfit.times), times, strict=True):
-        assert learnt == pytest.approx(more**2, rel=0.4) if more > 1.0 else 1.0 <= learnt < 3.0
+        assert 0.6 * more**2 < learnt < 1.1 * more**2 if more > 1.0 else learnt == 1.0
     # Without it, the noise is taken for a slippery road.
     monkeypatch.setattr(friction.bank, "OUTLIER", 1.0)
     _, said, std, _ = friction_of_noisy_sensors(times)
