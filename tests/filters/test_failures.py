@@ -131,6 +131,29 @@ def _dead_model():
     return eqx.tree_at(lambda m: m.measurement_noise, nile_model(1000.0, 300.0), law)
 
 
+class Lost(filters.ParticleFilter):
+    """A filter of a user's own that does not look at its likelihood."""
+
+    said: float = eqx.field(static=True, default=-np.inf)
+
+    def _init(self, model, row, key):
+        belief, info = super()._init(model, row, key)
+        return belief, info._replace(log_likelihood=jnp.asarray(self.said))
+
+    def _step(self, model, belief, row):
+        after, info = super()._step(model, belief, row)
+        return after, info._replace(log_likelihood=jnp.asarray(self.said))
+
+
+@pytest.mark.parametrize(("said", "code"), [(-np.inf, Result.measurement_too_far), (np.nan, 0), (-3.0, 0)])
+def test_an_infinite_likelihood_is_a_code_of_whatever_filter(said, code):
+    """NaN says that there is none. A failure that the filter tells of itself stays its own."""
+    filter_, model = Lost(50, said=said), nile_model(1000.0, 300.0)
+    assert np.asarray(filters.scan(filter_, model, _rows(NILE[:3]), KEY).info.result).tolist() == [int(code)] * 3
+    bad = filters.scan(filter_, model, _rows(_with_flow(1, np.inf)), KEY).info.result
+    assert np.asarray(bad)[:2].tolist() == [int(code), Result.non_finite_input]
+
+
 @pytest.mark.parametrize("filter_", [PF, filters.AuxiliaryParticleFilter(50, threshold=0.5)], ids=["PF", "APF"])
 def test_all_particles_dead(filter_):
     model, rows = _dead_model(), _rows(_with_flow(4, 1e5))

@@ -117,6 +117,7 @@ def test_what_is_not_finite_has_a_code(name):
         mean, _, _, info = short(filter_, model, rows, jax.random.key(5))
         told = np.asarray(info.result)
         assert (told != 0)[np.any(np.isnan(mean), axis=0)].all()
+        assert (told != 0)[np.isinf(info.log_likelihood)].all()
         return told
 
     assert codes(y0=(5, np.inf)).tolist() == [0, Result.non_finite_input, 0, 0]
