@@ -23,10 +23,12 @@ from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result, first_failure
 from jaxveh.statespace.belief import Info
-from jaxveh.statespace.contract import KEPT, AbstractFilter, check_told, who_lacks
+from jaxveh.statespace.capabilities import who_lacks
+from jaxveh.statespace.contract import KEPT, AbstractFilter, check_told
 from jaxveh.statespace.far_rows import warn_of_far_rows
 from jaxveh.statespace.model import Row, StateSpace
 from jaxveh.statespace.parameters import parameters_of
+from jaxveh.statespace.told_rows import check_rows
 
 FEW = 6
 """States up to which the steps of a batch are written out in scalars."""
@@ -105,7 +107,7 @@ def run(
     note_function("run: transition", model.transition_function)
     note_function("run: observation", model.observation_function)
     rows = model.rows(recording)
-    estimate = scan(filter, model, rows, key, as_names(keep))
+    estimate = _compiled_scan(filter, model, rows, key, as_names(keep))
     estimate = dataclasses.replace(estimate, time=recording.time)
     if throw:
         warn_of_far_rows(model, rows)
@@ -114,16 +116,25 @@ def run(
     return estimate
 
 
-@eqx.filter_jit
 def scan(filter: AbstractFilter, model: StateSpace, rows: Row, key=None, keep: tuple[str, ...] = SHOWN) -> Estimate:
-    """The compiled part of `run`, over rows with (T,) leaves.
+    """`run` without a recording and warnings, compiled, over rows with (T,) leaves.
 
     Under `jax.vmap` a Gaussian filter of up to 14 states is another program, if all runs together have `WORTH` rows or more.
     Up to six states, each scalar of the program holds the whole batch of runs: 14 times as fast for the log-likelihoods of
     1000 unscented filters of three states, five to seven times if all rows are kept. For more states the batch is the last
     axis of the matrices: six times as fast with 11 states. Differentiate the sum over the batch; a batch of the gradients of
     each run takes three times as long.
+
+    **Raises** `InputError` for rows of another model, and a model that the filter does not support.
     """
+    check_told(filter, model)
+    check_rows("scan", model, rows, 1)
+    filter.check(model)
+    return _compiled_scan(filter, model, rows, key, as_names(keep))
+
+
+@eqx.filter_jit
+def _compiled_scan(filter: AbstractFilter, model: StateSpace, rows: Row, key, keep: tuple[str, ...]) -> Estimate:
     return scan_and_keep(filter, model, rows, key, _nothing, keep)[0]
 
 
@@ -202,7 +213,8 @@ def scan_in_form(
         return info.log_likelihood, info.result, of_row, of_belief(belief)
 
     def body(belief, row):
-        belief, info = (filter.step if whole else filter._next)(model, belief, row)
+        told = model, belief, row
+        belief, info = numerics.apart(filter._next, belief.count, *told) if whole else filter._next(*told)
         return belief, shown(belief, info)
 
     if complete:

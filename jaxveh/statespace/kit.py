@@ -1,22 +1,17 @@
 """The parts for adding a filter, an observer or a driver."""
 
 from jaxveh._core.parameter import UNNAMED
-from jaxveh.statespace.contract import (
-    KEPT,
+from jaxveh.statespace.capabilities import (
     check_covariance,
     check_gradients,
-    check_model,
     check_noise_by_row,
     check_rows_between,
     check_smooths,
-    check_told,
     gradients_of,
-    innermost,
-    key_for,
-    layers,
     smoothing_of,
     who_lacks,
 )
+from jaxveh.statespace.contract import KEPT, check_model, check_told, innermost, key_for, layers
 from jaxveh.statespace.dependent_noise import check_fixed
 from jaxveh.statespace.disturbances import DISTURBANCE_PREFIX
 from jaxveh.statespace.draw import draw_rows, schedule_rows

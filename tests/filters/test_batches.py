@@ -11,7 +11,7 @@ from jaxveh import InputError, Result, filters
 from jaxveh.filters.smoothing.parallel import parallel_smoother
 from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
 from jaxveh.statespace import Info, Smoothing, kit
-from jaxveh.statespace.contract import who_lacks
+from jaxveh.statespace.capabilities import who_lacks
 
 BATCHED = [name for name, line in FILTERS.items() if who_lacks(line.make(), "written_out") is None]
 SMOOTHED = [name for name in BATCHED if kit.smoothing_of(FILTERS[name].make()) is Smoothing.gaussian]

@@ -20,6 +20,7 @@ from test_every_filter import Line, linear, recordings
 from jaxveh import InputError, filters, observers
 from jaxveh import statespace as ss
 from jaxveh._core.names import record_type
+from jaxveh.statespace.capabilities import who_lacks
 from jaxveh.statespace.contract import (
     AbstractFilter,
     AbstractTwoPartWrapper,
@@ -27,7 +28,6 @@ from jaxveh.statespace.contract import (
     Smoothing,
     innermost,
     layers,
-    who_lacks,
 )
 
 CLASSES = [

@@ -14,7 +14,8 @@ from test_every_filter import FILTERS, linear
 from jaxveh import InputError, filters
 from jaxveh.filters.gaussian.wrapper import AbstractStateless
 from jaxveh.filters.wrappers.base import gaussian_of
-from jaxveh.statespace.contract import Smoothing, smoothing_of
+from jaxveh.statespace.capabilities import smoothing_of
+from jaxveh.statespace.contract import Smoothing
 
 ROWS = 8
 TABLE = {name: line.make for name, line in FILTERS.items()} | {

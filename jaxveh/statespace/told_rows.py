@@ -1,0 +1,100 @@
+"""Checks of what `scan`, and `init` and `step` of a filter, are given: rows of the model, and a belief of the filter."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import InputError, word_for
+from jaxveh.statespace.model import Row, StateSpace
+
+MAKES = "model.row(t, u, y) makes a row of plain numbers, model.rows(recording) those of a recording."
+
+
+def check_rows(who: str, model: StateSpace, rows: Any, axes: int) -> None:
+    """Raise `InputError` unless `rows` is a `Row` of numbers of the model's inputs and channels in its precision: scalars
+    for no `axes`, as many rows in each for one."""
+    name = "rows" if axes else "row"
+    if not isinstance(rows, Row):
+        raise InputError(f"{who}: {name} = {word_for(rows)}: must be a Row(t, u, y). {MAKES}")
+    _check_fields(f"{who}: {name}.u", rows.u, model.inputs, "the model's inputs")
+    _check_fields(f"{who}: {name}.y", rows.y, model.channels, "the model's channels, NaN where one is missing")
+    own, needed = model.prior.mean[0].dtype, None
+    for place, value in _numbers(rows):
+        said = f"{who}: {name}.{place}"
+        if not hasattr(value, "dtype") or value.dtype != own:
+            raise InputError(
+                f"{said} = {word_for(value)}: must be an array of {own}, the precision of the model. {MAKES}"
+            )
+        needed = np.shape(value) if needed is None else needed
+        if len(needed) != axes or np.shape(value) != needed or 0 in needed:
+            wanted = "one number; jax.vmap takes several rows at once"
+            if axes:
+                wanted = "(T,), with the same T of at least one row in each of them"
+            raise InputError(f"{said} has the shape {np.shape(value)}: must be {wanted}. {MAKES}")
+
+
+def check_has_count(who: str, belief: Any) -> None:
+    """Raise `InputError` for what is no belief of any filter."""
+    if isinstance(belief, str | tuple | type) or not all(hasattr(belief, name) for name in ("t", "u", "count")):
+        raise InputError(
+            f"{who}: belief = {word_for(belief)}: must be the belief, the first of the two that init returned."
+        )
+
+
+def check_belief(who: str, belief: Any, like: Any) -> None:
+    """Raise `InputError` naming the first place in which a belief is of another kind, size or precision than `like`, that of
+    this filter and model after a first row."""
+    for place, given, own in _differences("belief", belief, like):
+        raise InputError(
+            f"{who}: {place} is {given}: must be {own}, as in the belief that init of this filter returns for this model. It is "
+            "of another filter, another model or another precision."
+        )
+
+
+def _check_fields(name: str, value: Any, fields: tuple[str, ...], what: str) -> None:
+    given = getattr(value, "_fields", () if type(value) is tuple and not value and not fields else None)
+    if given is None or set(given) != set(fields):
+        raise InputError(f"{name} = {word_for(value)}: must be a NamedTuple of ({', '.join(fields)}), {what}. {MAKES}")
+
+
+def _numbers(rows: Row) -> Iterator[tuple[str, Any]]:
+    yield "t", rows.t
+    for part in ("u", "y"):
+        values = getattr(rows, part)
+        yield from (
+            (f"{part}.{name}", value) for name, value in zip(getattr(values, "_fields", ()), values, strict=True)
+        )
+
+
+def _differences(place: str, given: Any, own: Any) -> Iterator[tuple[str, str, str]]:
+    """The places where two trees differ, with what is there in words. NamedTuples are alike if their fields are, and keys of
+    jax.random are of an old kind or a new one."""
+    if all(hasattr(one, "dtype") for one in (given, own)):
+        if not jnp.issubdtype(own.dtype, jax.dtypes.prng_key) and (given.shape, given.dtype) != (own.shape, own.dtype):
+            yield place, *(f"{one.dtype}{list(one.shape)}" for one in (given, own))
+        return
+    parts, needed = _parts(given), _parts(own)
+    if parts.keys() != needed.keys() or (dataclasses.is_dataclass(own) and type(given) is not type(own)):
+        yield place, word_for(given), word_for(own)
+        return
+    for name, part in needed.items():
+        yield from _differences(f"{place}.{name}", parts[name], part)
+
+
+def _parts(value: Any) -> dict[str, Any]:
+    """The parts of a tree by name, and the fields of a NamedTuple that is one of them; others have none."""
+    if isinstance(value, type):
+        return dict.fromkeys(getattr(value, "_fields", ()))
+    if dataclasses.is_dataclass(value):
+        return {field.name: getattr(value, field.name, None) for field in dataclasses.fields(value)}
+    if hasattr(value, "_fields"):
+        return value._asdict()
+    if isinstance(value, tuple | list):
+        return dict(zip(map(str, range(len(value))), value, strict=True))
+    return value if isinstance(value, dict) else {}
