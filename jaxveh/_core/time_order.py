@@ -1,8 +1,11 @@
-"""What to do about times that do not increase."""
+"""Instants that are the same, and what to do about times that do not increase."""
 
 from __future__ import annotations
 
 import numpy as np
+
+SAME_INSTANT = 1e-9
+"""s: time stamps that should be equal may differ by rounding; instants closer than this are the same."""
 
 _CLOCKS = {60.0: "of a minute", 3600.0: "of an hour", 86_400.0: "of a day", 604_800.0: "of a GPS week"}
 ROLLS = {

@@ -17,9 +17,6 @@ SPEEDS = ("wheel_speed_fl", "wheel_speed_fr", "wheel_speed_rl", "wheel_speed_rr"
 WITH = "(--channels), with its unit and sign"
 """The end of the advice to name a column."""
 
-MOST_LIKELY = 3
-"""The number of channels that a finding names."""
-
 INSTEAD = {"v_x": ("speed", "wheel_speed_fl", "wheel_speed_rl"), "steer": ("steering_wheel", "steer_fl", "steer_left")}
 """Channels from which the programs find another one: their names are enough."""
 
@@ -54,7 +51,7 @@ def _likely(wanted: str, alike: list[str]) -> LogFinding:
     """The finding that a channel is not there, while others look like it."""
     meant = "steer, or steering_wheel if it is the angle of the steering wheel" if wanted == "steer" else wanted
     message = f"may be {meant}, which is not there under that name, and is not used: name it in a channel map {WITH}."
-    return LogFinding("warning" if wanted in USUAL else "note", ", ".join(alike[:MOST_LIKELY]), message, {})
+    return LogFinding("warning" if wanted in USUAL else "note", ", ".join(alike[: kit.MOST_LIKELY]), message, {})
 
 
 def _plain(name: str) -> str:

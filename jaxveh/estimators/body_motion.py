@@ -16,9 +16,12 @@ from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractMethod, Answer
 from jaxveh.vehicles import GRAVITY, regularised_speed
+from jaxveh.vehicles import kit as vehicles
 
-AT = ("fl", "fr", "rl", "rr")
-SPEEDS = (Need("v_x", "m/s", optional=True), *(Need(f"wheel_speed_{at}", "m/s", optional=True) for at in AT))
+SPEEDS = (
+    Need("v_x", "m/s", optional=True),
+    *(Need(f"wheel_speed_{at}", "m/s", optional=True) for at in vehicles.CORNERS),
+)
 """The sources of the speed: the channel `v_x`, which another estimator may provide, otherwise the wheel speeds."""
 
 LATERAL = (Need("a_y", "m/s^2"), Need("yaw_rate", "rad/s"), Need("a_x", "m/s^2", optional=True), *SPEEDS)

@@ -39,9 +39,6 @@ from jaxveh.io import CarSpecification
 from jaxveh.io import kit as io
 from jaxveh.statespace import StateSpace
 
-MOST_NAMED = 30
-"""The number of channels that a message lists."""
-
 
 class Need(NamedTuple):
     """A channel that an estimator reads, in its `unit`. `optional`: needed only where the model measures it; `throughout`:
@@ -69,7 +66,7 @@ def check_needs(who: str, needs: tuple[Need, ...], recording: Recording, model: 
         likely = io.likely_words([need.channel for need in wanted if need.channel not in recording], measured)
         raise InputError(
             f"{who}: {', '.join(missing)} {verb} missing from the log; it has: "
-            f"{io.in_words(measured, MOST_NAMED) if measured else 'no channel'}.{' ' if likely else ''}{likely} "
+            f"{io.in_words(measured, io.MOST_NAMED) if measured else 'no channel'}.{' ' if likely else ''}{likely} "
             "Name the columns in a channel map, or in the recording."
         )
     for need in wanted:

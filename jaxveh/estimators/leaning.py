@@ -21,8 +21,6 @@ from jaxveh.estimators.steer_agreement import AgreementMemory, SteerAgreement, a
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
-DEGREE = math.pi / 180.0
-
 NEEDS = (*LATERAL, Need("roll_rate", "rad/s", optional=True), Need("course", "rad", optional=True))
 """The channels of a stability control; a gyroscope about the x axis and satellite navigation where available. With a
 `SteerAgreement` also those of the steer."""
@@ -34,7 +32,7 @@ STATES = (
 
 State = record_type("LeaningState", STATES)
 
-WIDEST = 1.0 * DEGREE
+WIDEST = math.radians(1.0)
 """rad: with a larger standard deviation, bank and roll count as unknown."""
 
 
@@ -45,7 +43,8 @@ FALL = 4.0
 """How fast the weight of a slip angle falls beyond the gate: with 1 or 2 a sliding axle still turns into a bank."""
 
 SLOWEST = 3.0
-"""m/s: the speed at which the road passes is at least this, so that the law of its bank has a spread at standstill."""
+"""m/s: the speed at which the road passes is at least this, so that the laws of its bank and grade have a spread at
+standstill."""
 
 
 MORE = ("v_y", "rear_scale", "roll_scale", "a_y_bias", "yaw_rate_bias", "roll_rate_bias")
@@ -106,7 +105,7 @@ class Leaning(AbstractSmoothable):
     delay: jax.Array = parameter("s", scale=0.1, default=0.14)
     a_y_offset: jax.Array = parameter("m/s^2", scale=0.1, default=0.0)
     a_y_offset_spread: jax.Array = positive("m/s^2", default=0.09)
-    gyro_offset_spread: jax.Array = positive("rad/s", default=0.12 * DEGREE)
+    gyro_offset_spread: jax.Array = positive("rad/s", default=math.radians(0.12))
     scale_spread: jax.Array = positive("-", default=0.12)
     steering: SteerAgreement | None = None
 

@@ -18,6 +18,7 @@ from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.lateral import motion_of
+from jaxveh.estimators.leaning import SLOWEST
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractSmoothable, Filtered, answer
 from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
@@ -25,8 +26,6 @@ from jaxveh.estimators.sliding import Sliding
 from jaxveh.filters import Extended
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
-
-DEGREE = math.pi / 180.0
 
 ALONG = (
     Need("a_x", "m/s^2"),
@@ -44,10 +43,7 @@ State = record_type(
     "PullingState", ("v_x", "grade", "grade_rate", "a_x_bias", "log_mass", "rolling_bias", "wheel_scale", "slip")
 )
 
-SLOWEST = 3.0
-"""m/s: the speed at which the road passes is at least this, so that the law of its grade has a spread at standstill."""
-
-WIDEST = 0.8 * DEGREE
+WIDEST = math.radians(0.8)
 """rad: with a larger standard deviation, the grade counts as unknown."""
 
 WIDEST_MASS = 0.05

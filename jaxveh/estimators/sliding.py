@@ -10,8 +10,9 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
-from jaxveh.estimators.body_motion import AT, away_from_zero
+from jaxveh.estimators.body_motion import away_from_zero
 from jaxveh.vehicles import GRAVITY
+from jaxveh.vehicles import kit as vehicles
 
 
 class Doubt(NamedTuple):
@@ -74,7 +75,7 @@ class Sliding(eqx.Module):
         return SlidingMemory(gathered, ordinary, usual, doubt)
 
     def _along(self, usual, heard, v_x, wheelbase):
-        speeds = jnp.stack([heard[f"wheel_speed_{at}"] for at in AT])
+        speeds = jnp.stack([heard[f"wheel_speed_{at}"] for at in vehicles.CORNERS])
         there = ~jnp.isnan(speeds)
         fast, turn = jnp.abs(away_from_zero(v_x)), heard["yaw_rate"]
         # Outer wheels run on wider circles than inner ones, front wheels on wider circles than rear ones.

@@ -3,9 +3,9 @@
 from jaxveh.io.car import CAR_SCHEMA, STEERINGS, car_lines, car_of_toml
 from jaxveh.io.channel_map import CHANNEL_MAP_SCHEMA
 from jaxveh.io.datasets import dataset_of, frame_of, of_dataset
-from jaxveh.io.likely_names import likely_names, likely_words
+from jaxveh.io.likely_names import MOST_LIKELY, likely_names, likely_words
 from jaxveh.io.mcap_log import MCAP_SUFFIX
-from jaxveh.io.naming import check_known
+from jaxveh.io.naming import MOST_NAMED, check_known
 from jaxveh.io.nested_log import in_words
 from jaxveh.io.optional import require
 from jaxveh.io.property_file import PROPERTY_UNITS, Entry, parse_property_file
@@ -20,6 +20,8 @@ __all__ = [
     "CHANNEL_MAP_SCHEMA",
     "FILES",
     "MCAP_SUFFIX",
+    "MOST_LIKELY",
+    "MOST_NAMED",
     "PROPERTY_UNITS",
     "RESULT_SUFFIXES",
     "RIG_CHANNELS",

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 
 from jaxveh.io.canonical import CANONICAL, canonical_unit
 
-MOST = 3  # names that a message proposes for one channel
+MOST_LIKELY = 3
+"""The number of names that a message proposes for one channel."""
 _ACCELERATION = r"(acc\w*|beschl\w*|g force|g)"
 _OF = lambda axis, letter: (
     rf"\b{axis} ?{_ACCELERATION}\b|\b{_ACCELERATION} ?{axis}\b|\b{axis}\w*beschl\w*|\b(acc\w*|a) ?{letter}\b|\b{letter} acc\w*\b"
@@ -80,7 +81,7 @@ def likely_names(channel: str, names: Iterable[str]) -> list[str]:
 
 def likely_words(missing: Iterable[str], names: Iterable[str]) -> str:
     """Return a sentence for a message, which proposes `names` for known channels that are missing; "" if none looks like one."""
-    alike = {channel: likely_names(channel, names)[:MOST] for channel in missing}
+    alike = {channel: likely_names(channel, names)[:MOST_LIKELY] for channel in missing}
     return " ".join(f"{', '.join(found)} may be {channel}." for channel, found in alike.items() if found)
 
 

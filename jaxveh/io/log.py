@@ -14,7 +14,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap
 from jaxveh.io.decimals import decimal
-from jaxveh.io.likely_names import MOST, likely_names, unit_of_ending
+from jaxveh.io.likely_names import MOST_LIKELY, likely_names, unit_of_ending
 from jaxveh.io.naming import check_known, listing, split_unit
 from jaxveh.io.repeats import without_repeats
 from jaxveh.io.stamps import seconds
@@ -131,7 +131,7 @@ class TableLog(Log):
                 if name in self._heading and name.casefold() == wanted:
                     return name
         alike = likely_names("time", self._heading)
-        first = f" {', '.join(alike[:MOST])} may be it." if alike else ""
+        first = f" {', '.join(alike[:MOST_LIKELY])} may be it." if alike else ""
         raise InputError(
             f"{self.path}: no time column ({', '.join(TIME_NAMES)}); {listing('time', self._heading)}.{first} "
             'Name it in a channel map: time = "COLUMN", or time = { column = "COLUMN", unit = "ms" }.'

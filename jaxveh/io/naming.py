@@ -8,7 +8,8 @@ from collections.abc import Iterable
 from jaxveh._core.errors import InputError, near
 from jaxveh.io.units import is_unit_name
 
-_SHOWN = 30
+MOST_NAMED = 30
+"""The number of names that a message lists."""
 
 # `wheel[3]` is a name, `speed [km/h]` is a name and a unit; `speed (km/h)` too, but not `speed (GPS)`.
 _UNIT_IN_NAME = re.compile(r"^(?P<name>.*\S)\s*\[(?!\d+\])(?P<unit>[^\[\]]*)\]$")
@@ -22,8 +23,8 @@ def listing(name: str, names: Iterable[str]) -> str:
     ordered = close + [candidate for candidate in names if candidate not in close]
     if not ordered:
         return "there are none"
-    more = f", and {len(ordered) - _SHOWN} more" if len(ordered) > _SHOWN else ""
-    return f"there are: {', '.join(ordered[:_SHOWN])}{more}"
+    more = f", and {len(ordered) - MOST_NAMED} more" if len(ordered) > MOST_NAMED else ""
+    return f"there are: {', '.join(ordered[:MOST_NAMED])}{more}"
 
 
 def check_known(what: str, kind: str, name: str, names: Iterable[str], advice: str = "") -> None:

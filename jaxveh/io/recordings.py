@@ -17,7 +17,7 @@ from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
 from jaxveh.io.csv_log import open_csv, write_csv
 from jaxveh.io.files import check_readable, check_suffix, replacing_file
-from jaxveh.io.likely_names import MOST, likely_names
+from jaxveh.io.likely_names import MOST_LIKELY, likely_names
 from jaxveh.io.log import Column, Log, apply, check_ending
 from jaxveh.io.mat_log import open_mat
 from jaxveh.io.mcap_reader import open_mcap
@@ -93,8 +93,8 @@ SUFFIXES = tuple(_WRITE)
 """File name endings that are read and written."""
 LOG_SUFFIXES = tuple(_OPEN)
 """File name endings that are read."""
-MOST_NAMED = 8
-"""The number of columns that a message names."""
+MOST_OTHERS = 8
+"""The number of columns that were left out which a warning names, beside the first."""
 
 
 def read_recording(
@@ -173,7 +173,7 @@ def _read(
         return recording if raster is None else resample(recording, raster, method)
     except InputError as error:
         told = chosen is not None and chosen.time is not None
-        others = [] if told or np.all(np.diff(time) > 0) else likely_names("time", log.names)[:MOST]
+        others = [] if told or np.all(np.diff(time) > 0) else likely_names("time", log.names)[:MOST_LIKELY]
         other = f' Or is {", ".join(others)} the time? Name it in a channel map: time = "COLUMN".' if others else ""
         raise InputError(f"{path}: {error}{other}") from error
 
@@ -251,7 +251,7 @@ def _load_all(log: Log) -> dict[str, Column]:
         raise next(iter(left.values()))
     if left:
         first, *more = left
-        names = f"{first!r}" + (f", and {len(more)} more ({', '.join(more[:MOST_NAMED])})" if more else "")
+        names = f"{first!r}" + (f", and {len(more)} more ({', '.join(more[:MOST_OTHERS])})" if more else "")
         warnings.warn(f"left out {names}: {left[first]}", JaxvehWarning, stacklevel=2)
     return loaded
 

@@ -12,9 +12,9 @@ from jaxveh._core.errors import InputError, check_flags, check_one_of
 from jaxveh.plots.style import COLOURS, colour, legend, new_figure, style
 from jaxveh.plots.tyres import check_tyre
 from jaxveh.tyres import Contact
+from jaxveh.vehicles import kit as vehicles
 
 POINTS = 200
-AXLES = ("front", "rear")
 
 
 def force_curves(
@@ -35,17 +35,17 @@ def force_curves(
     **Returns** the figure. **Raises** `InputError` if an axle's slips are missing.
     """
     check_flags(errors=errors)
-    for axle in AXLES:
+    for axle in vehicles.AXLES:
         check_one_of("axle", axle, tuple(slips))
     for label, car in cars.items():
-        for axle in AXLES:
+        for axle in vehicles.AXLES:
             check_tyre(f"plots.force_curves: {label}.{axle}", getattr(car, axle, None))
     errors = errors and "truth" in cars and len(cars) > 1
     with style():
         figure = new_figure(4.6 if errors else 3.0) if figure is None else figure
         ratios = [2, 1] if errors else [1]
         axes = figure.subplots(len(ratios), 2, sharex="col", sharey="row", squeeze=False, height_ratios=ratios)
-        for column, axle in enumerate(AXLES):
+        for column, axle in enumerate(vehicles.AXLES):
             _curves(axes[0, column], axle, cars, slips[axle], draws)
             axes[0, column].set_title(f"{axle} axle")
             if errors:
@@ -113,14 +113,14 @@ def _grid(visited: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def lateral_force(car: Any, axle: str, slip: np.ndarray) -> np.ndarray:
     """Return the axle's lateral force (S,), N, at slip angles (S,) and its static load."""
-    load = car.static_loads()[AXLES.index(axle)]
+    load = car.static_loads()[vehicles.AXLES.index(axle)]
     contact = Contact(slip_angle=jax.numpy.asarray(slip, load.dtype), load=load)
     return np.asarray(getattr(car, axle).forces(contact).F_y, dtype=np.float64)
 
 
 def _band(draws: Any, axle: str, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the limits of the central 95 % of the draws' forces at each slip angle, N."""
-    load = draws.static_loads()[AXLES.index(axle)]
+    load = draws.static_loads()[vehicles.AXLES.index(axle)]
     at = Contact(slip_angle=jax.numpy.asarray(slip, load.dtype), load=load)
     forces = jax.vmap(lambda tyre: tyre.forces(at).F_y)(getattr(draws, axle))
     low, high = np.quantile(np.asarray(forces, dtype=np.float64), (0.025, 0.975), axis=0)

@@ -9,8 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
-
-_LATE = 1e-9  # s: time stamps that should be equal may differ by rounding
+from jaxveh._core.time_order import SAME_INSTANT
 
 
 def as_spans(spans) -> tuple[tuple[float, float], ...]:
@@ -33,7 +32,7 @@ def check_spans(name: str, spans) -> None:
 
 def since(times: jax.Array, start: Any) -> jax.Array:
     """Whether each time is at or after `start`."""
-    return times - jnp.asarray(start, times.dtype) >= -_LATE
+    return times - jnp.asarray(start, times.dtype) >= -SAME_INSTANT
 
 
 def inside(times: jax.Array, spans) -> jax.Array:

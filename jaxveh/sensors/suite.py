@@ -13,14 +13,12 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_key, check_kind, is_concrete
 from jaxveh._core.names import as_mapping
+from jaxveh._core.time_order import SAME_INSTANT
 from jaxveh.sensors.device import AbstractDevice, check_outputs, name_of
 from jaxveh.sensors.randomness import subkey
 from jaxveh.sensors.wrapper import innermost
 
 _NAME = "jaxveh.sensors.Suite"
-
-_SAME = 1e-9
-"""Instants that are closer than this (s) are the same instant."""
 
 
 class Measured(NamedTuple):
@@ -118,7 +116,7 @@ class Suite(eqx.Module):
             seen = {name: outputs[name] for name in (*device.needs, *device.may_use) if name in outputs}
             if spoken.size:
                 said = _read(device, spoken, {n: v[rows] for n, v in seen.items()}, own)
-                to = np.searchsorted(times, spoken - _SAME)
+                to = np.searchsorted(times, spoken - SAME_INSTANT)
                 channels |= {n: jnp.full(times.shape, jnp.nan, v.dtype).at[to].set(v) for n, v in said.items()}
             else:
                 silent = jnp.full(times.shape, jnp.nan, next(iter(seen.values())).dtype)
@@ -155,13 +153,13 @@ def _read(device: AbstractDevice, times, outputs, key) -> dict[str, jax.Array]:
 def _union(grids: list[np.ndarray]) -> np.ndarray:
     """All instants of several increasing grids in order, without those that are within a nanosecond after another."""
     times = np.sort(np.concatenate(grids))
-    return times[np.diff(times, prepend=-np.inf) > _SAME]
+    return times[np.diff(times, prepend=-np.inf) > SAME_INSTANT]
 
 
 def _locate(times: np.ndarray, instants: np.ndarray, who: str) -> np.ndarray:
     """The rows of `times` at these instants."""
-    rows = np.minimum(np.searchsorted(times, instants - _SAME), times.size - 1)
-    lost = np.abs(times[rows] - instants) > _SAME
+    rows = np.minimum(np.searchsorted(times, instants - SAME_INSTANT), times.size - 1)
+    lost = np.abs(times[rows] - instants) > SAME_INSTANT
     if lost.any():
         missing = instants[np.argmax(lost)]
         raise InputError(

@@ -14,10 +14,14 @@ from jaxveh._core.parameter import positive
 from jaxveh.sensors.low_pass import LowPass, filtered_rows
 from jaxveh.sensors.signal import Signal, as_signals
 from jaxveh.sensors.signal_instrument import AbstractSignalInstrument
+from jaxveh.vehicles import kit as vehicles
 
-_WHEELS = ("fl", "fr", "rl", "rr")
-_BRAKE = ("brake_torque", *(f"brake_torque_{wheel}" for wheel in _WHEELS))
-_MOTOR = ("drive_torque", *(f"drive_torque_{wheel}" for wheel in _WHEELS), *(f"torque_{wheel}" for wheel in _WHEELS))
+_BRAKE = ("brake_torque", *(f"brake_torque_{wheel}" for wheel in vehicles.CORNERS))
+_MOTOR = (
+    "drive_torque",
+    *(f"drive_torque_{wheel}" for wheel in vehicles.CORNERS),
+    *(f"torque_{wheel}" for wheel in vehicles.CORNERS),
+)
 
 
 class AbstractTorque(AbstractSignalInstrument):

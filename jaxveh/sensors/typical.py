@@ -13,8 +13,9 @@ from jaxveh.sensors.sensor_set import position_of
 from jaxveh.sensors.signal import Signal
 from jaxveh.sensors.steering_angle import SteeringAngle
 from jaxveh.sensors.suite import Suite
-from jaxveh.sensors.wheel_speeds import WHEELS, WheelSpeeds
+from jaxveh.sensors.wheel_speeds import WheelSpeeds
 from jaxveh.vehicles import GRAVITY
+from jaxveh.vehicles import kit as vehicles
 
 _DEGREE = math.pi / 180
 _KMH = 1 / 3.6
@@ -107,6 +108,6 @@ def _steering(ratio: float | None) -> SteeringAngle:
 
 
 def _wheels(radius: float) -> WheelSpeeds:
-    errors = dict(zip(WHEELS, (0.002, -0.003, 0.005, -0.001), strict=True))
+    errors = dict(zip(vehicles.CORNERS, (0.002, -0.003, 0.005, -0.001), strict=True))
     signals = {f"wheel_speed_{w}": Signal(scale=error, quantisation=_KMH / 64) for w, error in errors.items()}
     return WheelSpeeds(signals, radius=radius, lowest=_KMH, tooth_error=0.01, rate=50.0, delay=0.02)

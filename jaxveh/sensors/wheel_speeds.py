@@ -16,11 +16,11 @@ from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.sensors.device import AbstractInstrument
 from jaxveh.sensors.randomness import subkey
 from jaxveh.sensors.signal import Signal, apply_all, as_signals, check_signals
+from jaxveh.vehicles import kit as vehicles
 
-WHEELS = ("fl", "fr", "rl", "rr")
-_SPEEDS = tuple(f"wheel_speed_{wheel}" for wheel in WHEELS)
-_SPINS = tuple(f"omega_{wheel}" for wheel in WHEELS)
-_SEEN = {f"omega_{wheel}": f"omega_to_body_{wheel}" for wheel in WHEELS}
+_SPEEDS = tuple(f"wheel_speed_{wheel}" for wheel in vehicles.CORNERS)
+_SPINS = tuple(f"omega_{wheel}" for wheel in vehicles.CORNERS)
+_SEEN = {f"omega_{wheel}": f"omega_to_body_{wheel}" for wheel in vehicles.CORNERS}
 _TEETH_TAG, _START_TAG = 100, 101
 _LONG = 1e3
 """The time (s) since the last edge of a wheel that stands still at the start."""

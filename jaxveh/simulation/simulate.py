@@ -26,6 +26,7 @@ from jaxveh._core.parameter import strong
 from jaxveh._core.progress import Progress, check_progress, silent
 from jaxveh._core.recording import TRUTH, Recording
 from jaxveh._core.result import Result
+from jaxveh._core.time_order import SAME_INSTANT
 from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre
 from jaxveh.sensors import AbstractDevice, Instrumented, SensorSet, Suite
 from jaxveh.simulation import stiffness
@@ -51,9 +52,6 @@ from jaxveh.statespace import cast
 from jaxveh.vehicles import AbstractVehicle, Travelling
 
 SOLVERS = ("auto", "explicit", "implicit")
-
-SAME = 1e-9
-"""s: instants that differ by less count as one."""
 
 ROUNDS = 3
 """Most runs until equal steps hold the fastest motion of their result; after them the implicit method takes over."""
@@ -314,7 +312,7 @@ def device_rows(suite: Suite, duration: float) -> np.ndarray:
     """The instants from 0 on at which a device of the suite samples or reports (s); with only one instant also the end."""
     every = np.unique(np.concatenate([[0.0], suite.sample_times(duration), suite.look_times(duration)]))
     # Instants that differ only by rounding are one.
-    rows = every[np.concatenate([[True], np.diff(every) > SAME])]
+    rows = every[np.concatenate([[True], np.diff(every) > SAME_INSTANT])]
     # A drive has a beginning and an end, however rarely a device reports.
     return rows if len(rows) > 1 else np.append(rows, duration)
 
@@ -323,7 +321,7 @@ def _devices(driven: Driven, found: Solution, rows: np.ndarray, suite: Suite, du
     """The devices' measurements, with the truth, at the instants of any device; and the indices of these instants in `rows`."""
     truth = {**_inputs(driven, found), **found.outputs._asdict()}
     times, said, units = suite.record(rows, truth, duration, key)
-    at = np.clip(np.searchsorted(rows, times - SAME), 0, len(rows) - 1)
+    at = np.clip(np.searchsorted(rows, times - SAME_INSTANT), 0, len(rows) - 1)
     shown = {TRUTH + name: value[at] for name, value in truth.items()}
     return Recording(times, {**said, **shown}, {**_units(driven, shown), **units}, source), at
 

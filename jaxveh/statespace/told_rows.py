@@ -58,8 +58,9 @@ def check_belief(who: str, belief: Any, like: Any) -> None:
 
 
 def _check_fields(name: str, value: Any, fields: tuple[str, ...], what: str) -> None:
-    given = getattr(value, "_fields", () if type(value) is tuple and not value and not fields else None)
-    if given is None or set(given) != set(fields):
+    if not fields and (value is None or value == ()):
+        return
+    if not hasattr(value, "_fields") or set(value._fields) != set(fields):
         raise InputError(f"{name} = {word_for(value)}: must be a NamedTuple of ({', '.join(fields)}), {what}. {MAKES}")
 
 
@@ -67,9 +68,7 @@ def _numbers(rows: Row) -> Iterator[tuple[str, Any]]:
     yield "t", rows.t
     for part in ("u", "y"):
         values = getattr(rows, part)
-        yield from (
-            (f"{part}.{name}", value) for name, value in zip(getattr(values, "_fields", ()), values, strict=True)
-        )
+        yield from ((f"{part}.{name}", getattr(values, name)) for name in getattr(values, "_fields", ()))
 
 
 def _differences(place: str, given: Any, own: Any) -> Iterator[tuple[str, str, str]]:

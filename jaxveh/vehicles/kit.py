@@ -1,5 +1,6 @@
 """The building blocks for new vehicles."""
 
+from jaxveh.vehicles.axles import AXLES
 from jaxveh.vehicles.base import with_batch_shape
 from jaxveh.vehicles.drive import AbstractDriven
 from jaxveh.vehicles.fast_states import has_fast_states
@@ -19,10 +20,21 @@ from jaxveh.vehicles.steering import STEER_UNITS, STEERINGS, AbstractSteeredByRo
 from jaxveh.vehicles.traction import AbstractSpinless
 from jaxveh.vehicles.two_track import AbstractLoadedTwoTrack, AbstractTwoTrack, air_drag, rolling_wheels
 from jaxveh.vehicles.upright_body import AbstractUprightTwoTrack
-from jaxveh.vehicles.wheels import Wheels, body_forces, corners, each_wheel, travel_direction, wheel_names, wheels_of
+from jaxveh.vehicles.wheels import (
+    CORNERS,
+    Wheels,
+    body_forces,
+    corners,
+    each_wheel,
+    travel_direction,
+    wheel_names,
+    wheels_of,
+)
 
 __all__ = [
+    "AXLES",
     "CARS",
+    "CORNERS",
     "FIDELITIES",
     "STEERINGS",
     "STEER_UNITS",

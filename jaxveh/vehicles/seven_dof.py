@@ -14,17 +14,15 @@ from jaxveh.vehicles.steering import steer_outputs
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.upright_body import AbstractUprightTwoTrack
 from jaxveh.vehicles.wheels import (
+    SPINS,
     Wheels,
     body_forces,
     each_wheel,
     gravity,
     sum_of_wheels,
     travel_direction,
-    wheel_names,
     wheels_of,
 )
-
-SPINS = wheel_names("omega")
 
 
 class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):

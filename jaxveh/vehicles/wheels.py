@@ -44,6 +44,10 @@ def wheel_names(prefix: str) -> tuple[str, ...]:
     return tuple(f"{prefix}_{corner}" for corner in CORNERS)
 
 
+SPINS = wheel_names("omega")
+"""Angular velocities of the wheels, rad/s."""
+
+
 def wheels_of(values: Any, prefix: str) -> Wheels:
     """The four fields `prefix_fl` ... of a NamedTuple, as `Wheels`."""
     return Wheels(*[getattr(values, name) for name in wheel_names(prefix)])

@@ -14,11 +14,10 @@ from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction.laws import LEAST_FRICTION, PlanarCar, SimilarCurve
 from jaxveh.estimators.two_axles import LONGEST, LOWEST, slip_stiffness
 from jaxveh.tyres import kit as tyres
+from jaxveh.vehicles import kit as vehicles
 
-CORNERS = ("fl", "fr", "rl", "rr")
-
-WHEELS = tuple(Need(f"wheel_speed_{at}", "m/s", optional=True) for at in CORNERS) + tuple(
-    Need(f"torque_{at}", "N m", optional=True) for at in CORNERS
+WHEELS = tuple(Need(f"wheel_speed_{at}", "m/s", optional=True) for at in vehicles.CORNERS) + tuple(
+    Need(f"torque_{at}", "N m", optional=True) for at in vehicles.CORNERS
 )
 """The wheel speeds, and the torques at the wheels."""
 
@@ -70,7 +69,9 @@ class WheelForces(eqx.Module):
     def next(self, last: WheelsTold, t, values, told) -> WheelsTold:
         """The memory after the next row; `told` is the motion's `Told` of the same row."""
         dt = jnp.clip(t - last.t, 0.0, 1.0)
-        speeds, torques = (jnp.stack([values[f"{kind}_{at}"] for at in CORNERS]) for kind in ("wheel_speed", "torque"))
+        speeds, torques = (
+            jnp.stack([values[f"{kind}_{at}"] for at in vehicles.CORNERS]) for kind in ("wheel_speed", "torque")
+        )
         here = ~(jnp.isnan(speeds) | jnp.isnan(torques))
         speed = jnp.where(jnp.isnan(speeds), last.last_speed, speeds)
         torque = jnp.where(jnp.isnan(torques), last.last_torque, torques)

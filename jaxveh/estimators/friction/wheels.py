@@ -12,14 +12,15 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.friction.along import CORNERS, LEAST_SLIP, Slips, WheelForces, WheelsTold
+from jaxveh.estimators.friction.along import LEAST_SLIP, Slips, WheelForces, WheelsTold
 from jaxveh.estimators.friction.laws import PlanarCar, SimilarCurve
 from jaxveh.estimators.friction.motion import Told, next_told, start_told
 from jaxveh.estimators.method import AbstractMethod, Answer, answer
+from jaxveh.vehicles import kit as vehicles
 
 SPEED = (Need("v_x", "m/s"),)
 WHEEL_CHANNELS = tuple(
-    Need(f"{kind}_{at}", unit) for kind, unit in (("wheel_speed", "m/s"), ("torque", "N m")) for at in CORNERS
+    Need(f"{kind}_{at}", unit) for kind, unit in (("wheel_speed", "m/s"), ("torque", "N m")) for at in vehicles.CORNERS
 )
 MORE = (
     Need("a_x", "m/s^2", optional=True),

@@ -10,9 +10,9 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.bank.tseng import STEERING
 from jaxveh.estimators.body_motion import SILENCE, away_from_zero, hold
 from jaxveh.estimators.car_file import number_of
-from jaxveh.estimators.contract import Need
 from jaxveh.estimators.leaning import Leaning, leaning_filter
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.sequential import Belief, belief_of, correct
@@ -27,8 +27,6 @@ RATES = {"yaw_inertia": 10.0, "front_axle_to_cg": 0.005, "steer_offset": 2e-4, "
 
 NARROW = {"yaw_inertia": 0.1, "front_axle_to_cg": 0.05, "steer_offset": 6e-4, "steering_ratio": 0.025}
 """Standard deviations below which a number is known: relative to the start for inertia and ratio, otherwise in its unit."""
-
-STEERING = Need("steering_wheel", "rad")
 
 Steering = record_type("SteeringFit", ("ratio", "offset", "understeer"))
 """Relative error of the ratio, offset at the road wheels (rad), understeer gradient less that of the start (rad/(m/s^2))."""

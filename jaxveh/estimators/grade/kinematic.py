@@ -14,11 +14,9 @@ from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.pulling import ALONG, SLOWEST
+from jaxveh.estimators.sideslip_methods.common import LONG_AGO
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
-
-LONG_AGO = 1e3
-"""s: the time since the last fix, before the first one."""
 
 
 class KinematicMemory(NamedTuple):

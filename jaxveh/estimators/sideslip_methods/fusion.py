@@ -15,8 +15,6 @@ from jaxveh.estimators.memberships import large
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.sideslip_methods.common import (
     A_X,
-    A_Y,
-    YAW_RATE,
     Guarded,
     guard,
     joined_needs,
@@ -24,7 +22,7 @@ from jaxveh.estimators.sideslip_methods.common import (
     size_of,
 )
 from jaxveh.estimators.sideslip_methods.kinematic import kinematic_kalman
-from jaxveh.estimators.sideslip_methods.single_track import single_track_filter
+from jaxveh.estimators.sideslip_methods.single_track import SENSORS, single_track_filter
 from jaxveh.estimators.sideslip_methods.steady_state import SteadySteer
 from jaxveh.estimators.two_axles import linear_axles_of
 from jaxveh.io import CarSpecification
@@ -190,7 +188,6 @@ class Weighted(AbstractMethod):
         return (one[0], other[0]), said._replace(result=jnp.maximum(said.result, slow.result))
 
 
-SENSORS = (YAW_RATE, A_Y)
 EXTENDED = single_track_filter(filters.Extended(), claims=True)
 
 

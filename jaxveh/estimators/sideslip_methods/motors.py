@@ -27,9 +27,9 @@ from jaxveh.estimators.sideslip_methods.stiff_step import StiffStep
 from jaxveh.io import CarSpecification
 from jaxveh.statespace import StateSpace
 from jaxveh.vehicles import SingleTrack
+from jaxveh.vehicles import kit as vehicles
 
-CORNERS = ("fl", "fr", "rl", "rr")
-TORQUES = tuple(Need(f"torque_{at}", "N m", throughout=True) for at in CORNERS)
+TORQUES = tuple(Need(f"torque_{at}", "N m", throughout=True) for at in vehicles.CORNERS)
 
 
 class MotorTrack(eqx.Module):
@@ -56,7 +56,7 @@ class MotorTrack(eqx.Module):
         front, rear = car.contacts(full_state(car, x), u)
         steer = u.steer + car.steer_offset
         sine, cosine = numerics.sin(steer), numerics.cos(steer)
-        left, right, rear_left, rear_right = (getattr(u, f"torque_{at}") / self.wheel_radius for at in CORNERS)
+        left, right, rear_left, rear_right = (getattr(u, f"torque_{at}") / self.wheel_radius for at in vehicles.CORNERS)
         F_front = (left + right) * sine + car.front.forces(front).F_y * cosine
         F_rear = car.rear.forces(rear).F_y
         across = 0.5 * self.track_front * (right - left) * cosine + 0.5 * self.track_rear * (rear_right - rear_left)

@@ -13,8 +13,9 @@ from jaxveh.estimators.contract import Need
 from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.speed.accelerometer import Felt, never_felt
 from jaxveh.estimators.speed.free_wheels import AbstractFreeWheels
-from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, Wheels
+from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, Wheels
 from jaxveh.vehicles import GRAVITY
+from jaxveh.vehicles import kit as vehicles
 
 
 class Pushed(NamedTuple):
@@ -109,7 +110,7 @@ class MotorForces(AbstractForces):
 
     @property
     def torques(self):
-        return tuple(Need(f"torque_{at}", "N m") for at in AT)
+        return tuple(Need(f"torque_{at}", "N m") for at in vehicles.CORNERS)
 
     def force(self, wheels, heard):
         torque = sum(heard[need.channel] for need in self.torques)

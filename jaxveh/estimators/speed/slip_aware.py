@@ -35,10 +35,11 @@ from jaxveh.estimators.speed.slip_state import (
     front_rear,
     own_radii,
 )
-from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, wheel_values
+from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, wheel_values
 from jaxveh.estimators.two_axles import slip_stiffness
 from jaxveh.numerics import smooth_step
 from jaxveh.vehicles import GRAVITY
+from jaxveh.vehicles import kit as vehicles
 
 
 class SlipAware(AbstractMethod):
@@ -133,7 +134,7 @@ class SlipAware(AbstractMethod):
 
     def _hear(self, memory: Memory, t, values):
         now = dict(values) | {"steer": steer_heard(values, self.car.steering_ratio, self.car.steer_offset)}
-        torques = [values[f"torque_{place}"] for place in AT]
+        torques = [values[f"torque_{place}"] for place in vehicles.CORNERS]
         now["drive_torque"] = jnp.where(jnp.isnan(now["drive_torque"]), sum(torques), now["drive_torque"])
         heard = {n: jnp.where(jnp.isnan(now[n]), memory.heard[n], now[n]) for n in HELD}
         return heard, {n: jnp.where(jnp.isnan(now[n]), memory.at[n], t) for n in HELD}
@@ -240,7 +241,7 @@ class SlipAware(AbstractMethod):
         rolling = car.rolling_resistance * car.mass * GRAVITY
         push = car.mass * x.force + car.drag * x.rolled * jnp.abs(x.rolled) + rolling
         force = front_rear(*forces_of_axles(car, push))
-        brakes = [f"brake_torque_{place}" for place in AT]
+        brakes = [f"brake_torque_{place}" for place in vehicles.CORNERS]
         drive = 0.5 * front_rear(car.front_drive, 1.0 - car.front_drive) * memory.heard["drive_torque"]
         by_torque = (drive - jnp.stack([memory.heard[name] for name in brakes])) / car.wheel_radius
         known = jnp.stack([self._speaks(memory, name) for name in brakes]) & self._speaks(memory, "drive_torque")

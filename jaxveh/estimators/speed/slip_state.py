@@ -12,7 +12,7 @@ from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.sequential import Belief
 from jaxveh.estimators.speed.accelerometer import AbstractOffsetAndSlope
-from jaxveh.estimators.speed.wheels import AT
+from jaxveh.vehicles import kit as vehicles
 
 LEFT = np.array([1, -1, 1, -1])
 """1 for wheels on the left, -1 for those on the right; front left first."""
@@ -26,14 +26,14 @@ RADII = slice(6, 10)
 STATES = 13
 """Length of the state."""
 
-HELD = ("a_x", "a_y", "yaw_rate", "steer", "drive_torque", *(f"brake_torque_{at}" for at in AT))
+HELD = ("a_x", "a_y", "yaw_rate", "steer", "drive_torque", *(f"brake_torque_{at}" for at in vehicles.CORNERS))
 """Channels that are held between two samples."""
 
 MAY_HELP = tuple(
     Need(name, unit, optional=True)
     for name, unit in (
         ("a_x", "m/s^2"), ("a_y", "m/s^2"), ("yaw_rate", "rad/s"), ("steer", "rad"), ("steering_wheel", "rad"), ("speed", "m/s"),
-        ("drive_torque", "N m"), *[(f"brake_torque_{at}", "N m") for at in AT], *[(f"torque_{at}", "N m") for at in AT],
+        ("drive_torque", "N m"), *[(f"{kind}_{at}", "N m") for kind in ("brake_torque", "torque") for at in vehicles.CORNERS],
     )
 )  # fmt: skip
 """Channels that are used if a log has them."""

@@ -12,10 +12,9 @@ from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.numerics import smooth_step
+from jaxveh.vehicles import kit as vehicles
 
-AT = ("fl", "fr", "rl", "rr")
-
-WHEEL_SPEEDS = tuple(Need(f"wheel_speed_{at}", "m/s") for at in AT)
+WHEEL_SPEEDS = tuple(Need(f"wheel_speed_{at}", "m/s") for at in vehicles.CORNERS)
 
 PATIENCE = 0.1
 """s: time for which a sample is held."""

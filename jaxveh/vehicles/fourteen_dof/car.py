@@ -28,6 +28,7 @@ from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, dot, minus, times
 from jaxveh.vehicles.steering import steer_outputs
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.wheels import (
+    SPINS,
     Wheels,
     body_forces,
     each_wheel,
@@ -41,7 +42,6 @@ from jaxveh.vehicles.wheels import (
 )
 
 BODY = ("v_x", "v_y", "v_z", "z", "roll", "pitch", "yaw", "roll_rate", "pitch_rate", "yaw_rate")
-SPINS = wheel_names("omega")
 
 
 class FourteenDOF(AbstractSuspendedTwoTrack):
