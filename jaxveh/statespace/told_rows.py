@@ -24,7 +24,18 @@ def check_rows(who: str, model: StateSpace, rows: Any, axes: int) -> None:
         raise InputError(f"{who}: {name} = {word_for(rows)}: must be a Row(t, u, y). {MAKES}")
     _check_fields(f"{who}: {name}.u", rows.u, model.inputs, "the model's inputs")
     _check_fields(f"{who}: {name}.y", rows.y, model.channels, "the model's channels, NaN where one is missing")
-    own, needed = model.prior.mean[0].dtype, None
+    own = model.prior.mean[0].dtype
+    values = (rows.t, *(rows.u or ()), *rows.y)
+    # A live loop is held up by every name that is put together for nothing.
+    shape = getattr(rows.t, "shape", ())
+    alike = all(getattr(value, "shape", None) == shape and value.dtype == own for value in values)
+    if not alike or len(shape) != axes or 0 in shape:
+        _tell(who, name, rows, own, axes)
+
+
+def _tell(who: str, name: str, rows: Row, own: Any, axes: int) -> None:
+    """Raise `InputError` naming the first number of rows that is none, or of another precision or shape."""
+    needed = None
     for place, value in _numbers(rows):
         said = f"{who}: {name}.{place}"
         if not hasattr(value, "dtype") or value.dtype != own:
