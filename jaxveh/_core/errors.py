@@ -30,16 +30,6 @@ def is_concrete(*values) -> bool:
     return not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(values))
 
 
-def check_on_host(who: str, *values) -> None:
-    """Raise `InputError` for traced numbers in what runs on the host, as a fit of rig data does; its problem can be traced."""
-    if not is_concrete(*values):
-        raise InputError(
-            f"{who}: is given numbers that jit, vmap or grad traces, and runs on the host. Make the problem outside of them "
-            "with fitting.pose_rig, put traced numbers into it (eqx.tree_at(lambda p: p.measured, problem, ...)), and call "
-            "fitting.solve."
-        )
-
-
 NOT_REAL = "USOcMm"
 """The kinds of NumPy's types whose values are no real numbers: text, objects, complex numbers and dates."""
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError
+from jaxveh._core.host import on_host
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.drive_channels import channel, check_gaps, crossing, has, seconds
 
@@ -35,6 +36,7 @@ class BrakingTest(NamedTuple):
     most_slip: float
 
 
+@on_host
 def braking_test(recording: Recording) -> BrakingTest:
     """Return the numbers of a drive with one braking.
 

@@ -6,10 +6,12 @@ import functools
 import math
 
 from jaxveh._core.errors import check, check_positive
+from jaxveh._core.host import on_host
 
 TINY = 1e-300
 
 
+@on_host
 def chi_squared_tails(value: float, dof: float) -> tuple[float, float]:
     """Return P(X <= value) and P(X > value) of a chi-squared variable with `dof` > 0 degrees of freedom.
 
@@ -61,6 +63,7 @@ def _fraction(a: float, x: float) -> float:
     return value
 
 
+@on_host
 @functools.lru_cache(maxsize=1024)
 def chi_squared_quantile(share: float, dof: float) -> float:
     """Return the quantile `share` of a chi-squared variable with `dof` degrees of freedom, by bisection.
@@ -83,6 +86,7 @@ def chi_squared_quantile(share: float, dof: float) -> float:
     return 0.5 * (low + high)
 
 
+@on_host
 def chi_squared_band(dof: float, confidence: float = 0.95) -> tuple[float, float]:
     """Return the interval with equal tails that has probability `confidence` for `dof` degrees of freedom."""
     check("confidence", confidence, lambda p: (p > 0) & (p < 1), "above 0 and below 1")

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError
+from jaxveh._core.host import on_host
 from jaxveh.diagnostics.chi_squared import chi_squared_band, two_sided
 from jaxveh.diagnostics.innovations import by_runs_and_rows, checked_skip
 
@@ -50,6 +51,7 @@ class Consistency(NamedTuple):
         return "consistent" if self.consistent else "too confident" if not self.mean <= self.high else "too cautious"
 
 
+@on_host
 def nis(estimate: Any, confidence: float = 0.95, skip: int = 0) -> Consistency:
     """Return the normalised innovations squared: chi-squared, and independent between rows, if filter and model are right.
 
@@ -69,6 +71,7 @@ def nis(estimate: Any, confidence: float = 0.95, skip: int = 0) -> Consistency:
     return _independent_rows("nis", values, counts, confidence)
 
 
+@on_host
 def nis_by_channel(estimate: Any, confidence: float = 0.95, skip: int = 0) -> dict[str, Consistency]:
     """Return the `nis` of each measured channel alone, which shows the sensor whose noise is wrong; a mapping by channel.
 
@@ -96,6 +99,7 @@ def nis_by_channel(estimate: Any, confidence: float = 0.95, skip: int = 0) -> di
     return found
 
 
+@on_host
 def nees(error: Any, covariance: Any, confidence: float = 0.95, skip: int = 0) -> Consistency:
     """Return the normalised estimation errors squared, `e^T P^-1 e` against the truth: chi-squared with n degrees of freedom.
 

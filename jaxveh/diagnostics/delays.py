@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
+from jaxveh._core.host import on_host
 
 LONGEST = 2.0
 """Largest delay that is searched for, s."""
@@ -20,6 +21,7 @@ FEWEST = 10
 """Least number of rows for a comparison."""
 
 
+@on_host
 def delay(time: np.ndarray, mean: np.ndarray, truth: np.ndarray, *, longest: float = LONGEST) -> float:
     """Return the delay of `mean` behind `truth` (T,) along `time` (s), in s; it is negative if the estimate is early.
 

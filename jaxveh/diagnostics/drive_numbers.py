@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxveh._core.host import on_host
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.braking_test import braking_test
 from jaxveh.diagnostics.drive_channels import channel, has, sideslip
@@ -41,6 +42,7 @@ class LowestFrequency(NamedTuple):
     at_45_deg: float
 
 
+@on_host
 def peaks(recording: Recording) -> Peaks:
     """Return the largest absolute values in a drive, over all samples; NaN for channels missing from the recording."""
     loads = [f"load_{wheel}" for wheel in ("fl", "fr", "rl", "rr") if has(recording, f"load_{wheel}")]
@@ -62,6 +64,7 @@ class _Car(NamedTuple):
     steer_at_03g: float | None = None
 
 
+@on_host
 def drive_numbers(
     recording: Recording,
     manoeuvre: str | None = None,

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_positive
+from jaxveh._core.host import on_host
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.drive_channels import channel, check_gaps, seconds
 
@@ -35,6 +36,7 @@ class FrequencyResponse(NamedTuple):
     segments: int
 
 
+@on_host
 def frequency_response(
     recording: Recording, output: str = "yaw_rate", input: str = "steer", *, segment: float | None = None
 ) -> FrequencyResponse:

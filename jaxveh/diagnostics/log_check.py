@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from jaxveh._core.host import on_host
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.log_delays import check_delays
 from jaxveh.diagnostics.log_findings import LogFinding, LogView
@@ -30,6 +31,7 @@ CHECKS = (
 )
 
 
+@on_host
 def check_log(recording: Recording, *, car: CarSpecification | None = None) -> list[LogFinding]:
     """Check a log before its data are used; return the findings of every check, good and bad, in the order of `CHECKS`.
 

@@ -9,6 +9,7 @@ import jax
 import numpy as np
 
 from jaxveh._core.errors import FilterError, InputError, check_positive
+from jaxveh._core.host import AFTER, check_on_host, on_host
 from jaxveh._core.parameters import Parameters
 
 UNOBSERVABLE = 1e9
@@ -96,11 +97,14 @@ def observability_at(
     **Raises** `InputError` for shapes that do not agree; `FilterError` if the prediction diverges. Use float64:
     condition numbers above 1e7 have no meaning in float32.
     """
+    check_on_host("observability_at", at, spread, advice=AFTER)
     spread, count = np.asarray(spread, dtype=np.float64), len(names)
     if at.shape != (count + nuisance,) or spread.shape != at.shape:
         raise InputError(f"at {at.shape}, spread {spread.shape}: must be ({count + nuisance},) for {', '.join(names)}.")
     check_positive("spread", spread)
-    jacobian = np.asarray(jax.jacfwd(predict)(at), dtype=np.float64) * spread
+    slopes = jax.jacfwd(predict)(at)
+    check_on_host("observability_at: predict", slopes, advice=AFTER)
+    jacobian = np.asarray(slopes, dtype=np.float64) * spread
     if not np.isfinite(jacobian).all():
         raise FilterError("observability: a sensitivity is not finite; the simulation diverges for these parameters.")
     return from_sensitivities(_marginal(jacobian, count), names, spread[:count])
@@ -117,6 +121,7 @@ def _marginal(jacobian: np.ndarray, count: int) -> np.ndarray:
     return root[nuisance:, nuisance:]
 
 
+@on_host
 def from_sensitivities(jacobian: np.ndarray, names: tuple[str, ...], spread: np.ndarray) -> Observability:
     """Compute the result from prior-scaled, whitened sensitivities (R, p)."""
     # With fewer measurements than parameters, rows of zeros are added for the directions without any measurement.

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError, check
+from jaxveh._core.host import on_host
 from jaxveh._core.result import Result
 from jaxveh.diagnostics.innovations import by_runs_and_rows
 
@@ -35,6 +36,7 @@ class ParticleHealth(NamedTuple):
         return self.result == Result.successful and self.share_below == 0
 
 
+@on_host
 def particle_health(estimate: Any, threshold: float = 0.1, particles: int | None = None) -> ParticleHealth:
     """Return the health of the particles behind an estimate.
 
@@ -91,6 +93,7 @@ class Ancestry(NamedTuple):
         return -1 if single.size == 0 else int(len(self.surviving) - 1 - single[-1])
 
 
+@on_host
 def ancestry(ancestors: Any) -> Ancestry:
     """Return the degeneracy of a particle filter's paths.
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError
+from jaxveh._core.host import on_host
 
 NORMAL_HALF, NORMAL_95 = 0.6744897501960817, 1.959963984540054
 """Half the widths of the central 50 and 95 % intervals of a standard normal distribution."""
@@ -35,6 +36,7 @@ class Score(NamedTuple):
     rows: int
 
 
+@on_host
 def score_band(
     reference: np.ndarray, mean: np.ndarray, std: np.ndarray | None = None, which: np.ndarray | None = None
 ) -> Score:

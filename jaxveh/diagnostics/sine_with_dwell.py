@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.host import on_host
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.drive_channels import channel, check_gaps, crossing, has, peak, seconds
 
@@ -69,6 +70,7 @@ class SineWithDwellTest(NamedTuple):
         return None if self.responsive is None and math.isnan(self.amplitude) else True
 
 
+@on_host
 def sine_with_dwell(
     recording: Recording,
     *,

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.host import on_host
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.drive_channels import (
     LONGEST_GAP,
@@ -56,6 +57,7 @@ class Understeer(NamedTuple):
     rows: int
 
 
+@on_host
 def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady: float = STEADY) -> SteadyTurns:
     """Return the quasi-steady rows of a drive, such as a slow ramp of steer, or a circle at slowly rising speed.
 
@@ -100,6 +102,7 @@ def _is_settled(time: np.ndarray, a_y: np.ndarray, steady: float) -> np.ndarray:
     return time - last > SETTLED
 
 
+@on_host
 def understeer(turns: SteadyTurns, *, above: float = 0.2, linear: float = LINEAR_A_Y) -> Understeer:
     """Return the gradients of ISO 4138 in the linear range, by least squares over rows with `above` <= |a_y| <= `linear` (m/s^2).
 

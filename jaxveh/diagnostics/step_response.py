@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.host import on_host
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.drive_channels import channel, check_gaps, crossing, peak, seconds
 
@@ -32,6 +33,7 @@ class StepResponse(NamedTuple):
     overshoot: float
 
 
+@on_host
 def step_response(recording: Recording, output: str = "yaw_rate", *, average: float = 0.5) -> StepResponse:
     """Return the numbers of ISO 7401 of one `output` in a drive whose `steer` is a step.
 

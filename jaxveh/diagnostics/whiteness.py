@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError, check, is_whole
+from jaxveh._core.host import on_host
 from jaxveh.diagnostics.chi_squared import chi_squared_tails
 from jaxveh.diagnostics.innovations import whitened_innovations
 
@@ -42,6 +43,7 @@ class Whiteness(NamedTuple):
         return float(np.mean(np.abs(self.correlations[known]) <= self.band[known]))
 
 
+@on_host
 def whiteness(estimate: Any, lags: int = 20, confidence: float = 0.95, skip: int = 0) -> Whiteness:
     """Return the portmanteau test of a filter's innovations, and their correlations with bands.
 

@@ -17,11 +17,11 @@ from jaxveh._core.errors import (
     check_at_least,
     check_flags,
     check_kind,
-    check_on_host,
     check_one_of,
     check_positive,
     check_whole,
 )
+from jaxveh._core.host import check_on_host
 from jaxveh._core.names import as_names, as_pairs, check_names
 from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, resolve
 from jaxveh._core.parameters import Parameters
@@ -137,10 +137,11 @@ def fit_rig(
     for `jit`, `vmap` and `grad` see `pose_rig` and `solve`.
 
     **Raises** `InputError` for a channel, weight or bound that has no match, a start outside its bounds or without finite
-    forces, too few rows, rows in which no slip varies, bad `folds` or `max_steps`;
+    forces, too few rows, rows in which no slip varies, bad `folds` or `max_steps`, traced numbers;
     `FilterError` if the joint fit does not converge, unless `throw=False`.
     """
-    _check_settings(law, max_steps, tolerance, folds, progress, robust=robust, staged=staged, throw=throw)
+    check_on_host("fit_rig", law, prior, weights, bounds)
+    _check_settings(max_steps, tolerance, folds, progress, robust=robust, staged=staged, throw=throw)
     data, plan, aside = _prepare(law, rig, where, free, prior, measured, weights, bounds, robust, max_steps, tolerance)
     parts = fold_of(rig, folds) if folds else np.full(rig.load.shape, -1)
     joint = _joint(data)
@@ -159,8 +160,7 @@ def fit_rig(
     return _result(data, tyre, joint, settled.held, tuple(reports), data.rmse(law), validation)
 
 
-def _check_settings(law: Any, max_steps: int, tolerance: float, folds: int, progress: Progress, **flags: Any) -> None:
-    check_on_host("fit_rig", law)
+def _check_settings(max_steps: int, tolerance: float, folds: int, progress: Progress, **flags: Any) -> None:
     check_flags(**flags)
     check_at_least("max_steps", max_steps, 1)
     check_at_least("tolerance", tolerance, 0)
@@ -196,6 +196,7 @@ def pose_rig(
     `noise`: standard deviations by channel; by default those of the law's own residuals, so that a problem at a fitted law has
     the noise of the fit. Other arguments and errors as in `fit_rig`.
     """
+    check_on_host("pose_rig", law, noise, prior, weights, bounds)
     check_flags(robust=robust)
     data, _, aside = _prepare(law, rig, where, free, prior, measured, weights, bounds, robust)
     levels = data.noise(law) if noise is None else dict(as_pairs(noise, "noise"))

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import equinox as eqx
 
 from jaxveh._core.errors import check_kind
+from jaxveh._core.host import on_host
 from jaxveh._core.names import as_names
 from jaxveh.fitting.rig_data import leaf_of
 from jaxveh.tyres import MFTyre
@@ -73,6 +74,7 @@ TWINS = (
 """All sign twins of versions 5.2, 6.1 and 6.2 that a rig without turn slip shows; others are products of them."""
 
 
+@on_host
 def canonical(tyre: MFTyre, fixed: Collection[str] = ()) -> MFTyre:
     """The twin of a tyre whose leading coefficients are positive (`TWINS`); its forces and moments are the same.
 

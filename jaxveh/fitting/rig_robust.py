@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import check_numbers
+from jaxveh._core.host import on_host
 from jaxveh.fitting.rig_problem import KINK
 
 FAR_RESIDUAL = 4.0
@@ -33,6 +34,7 @@ class Tails(NamedTuple):
     ratio: float
 
 
+@on_host
 def heavy_tails(residuals: np.ndarray) -> Tails | None:
     """The tails of residuals (n,) of one channel if they are heavier than those of normal noise, otherwise None; nan is left
     out.

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, check
+from jaxveh._core.host import check_on_host
 from jaxveh._core.recording import Recording
 from jaxveh.fitting.recorded import as_list
 from jaxveh.statespace import Row, StateSpace, kit
@@ -26,14 +27,21 @@ class Segments(NamedTuple):
     first: Any
 
 
+KNOWN_TIMES = (
+    "The times and the window decide how many segments there are, and must be known: let only the recordings' channels and the "
+    "model be traced, or cut outside of them and give the segments to fitting.pose_shooting."
+)
+
+
 def cut(model: StateSpace, recordings: Recording | Sequence[Recording], window: float) -> Segments:
-    """Cut recordings into segments of `window` seconds (of the first recording's median step, which must be concrete).
+    """Cut recordings into segments of `window` seconds (of the first recording's median step, which must be known under `jit`).
 
     A window longer than every recording is as long as the longest. Raises `InputError` for one that is not positive, or shorter
     than two steps.
     """
     kit.check_model("cut", model)
     recordings = as_list(recordings)
+    check_on_host("cut", [one.time for one in recordings], window, advice=KNOWN_TIMES)
     time = np.asarray(recordings[0].time)
     check("window", window, lambda _: True, "a time in seconds")
     step = float(np.median(np.diff(time))) if len(time) > 1 else np.inf

@@ -10,7 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_on_host, check_one_of, path_of
+from jaxveh._core.errors import InputError, check_one_of, path_of
+from jaxveh._core.host import check_on_host
 from jaxveh._core.names import as_several
 from jaxveh.io.csv_log import read_columns
 from jaxveh.io.files import check_readable, check_suffix

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.host import on_host
 from jaxveh._core.names import as_several
 from jaxveh.observers.base import check_gain
 from jaxveh.observers.luenberger import array
@@ -15,6 +16,7 @@ from jaxveh.observers.poles import slopes_without
 from jaxveh.statespace import StateSpace, kit
 
 
+@on_host
 def contraction_rate(
     model: StateSpace, gain: Any, points: Iterable[tuple[Any, Any]], *, dt: float, leave: tuple[str, ...] = ()
 ) -> float:

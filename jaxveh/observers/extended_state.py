@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.host import on_host
 from jaxveh._core.names import as_names
 from jaxveh.observers.luenberger import Luenberger
 from jaxveh.observers.poles import place_poles
 from jaxveh.statespace import StateSpace, kit
 
 
+@on_host
 def extended_state(
     model: StateSpace, bandwidth: float, *, dt: float, x: Any = None, u: Any = None, leave: tuple[str, ...] = ()
 ) -> Luenberger:

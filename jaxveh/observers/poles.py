@@ -10,12 +10,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_positive, word_for
+from jaxveh._core.host import on_host
 from jaxveh._core.names import as_names, as_pairs, check_names, record
 from jaxveh.observers.base import observe
 from jaxveh.observers.chains import chained_gain
 from jaxveh.statespace import Row, StateSpace, cast, kit
 
 
+@on_host
 def place_poles(
     model: StateSpace, poles: Any, *, dt: float, x: Any = None, u: Any = None, leave: tuple[str, ...] = ()
 ) -> np.ndarray:
@@ -70,6 +72,7 @@ def _place_poles(F: np.ndarray, H: np.ndarray, poles: np.ndarray) -> np.ndarray:
     return chained_gain(F, C, poles)
 
 
+@on_host
 def linearised_step(model: StateSpace, dt: float, x: Any = None, u: Any = None) -> tuple[np.ndarray, np.ndarray]:
     """Slopes of a step of `dt` seconds (n, n) and of the observation (m, n), at the state `x` and the inputs `u` of
     `place_poles`.

@@ -52,7 +52,9 @@ def _tell(who: str, name: str, rows: Row, own: Any, axes: int) -> None:
 
 def check_has_count(who: str, belief: Any) -> None:
     """Raise `InputError` for what is no belief of any filter."""
-    if isinstance(belief, str | tuple | type) or not all(hasattr(belief, name) for name in ("t", "u", "count")):
+    count = getattr(belief, "count", None)
+    # Lists, tuples and texts have a method of this name.
+    if count is None or callable(count) or isinstance(belief, type):
         raise InputError(
             f"{who}: belief = {word_for(belief)}: must be the belief, the first of the two that init returned."
         )

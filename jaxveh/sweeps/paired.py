@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_numbers, check_whole
+from jaxveh._core.host import on_host
 
 RESAMPLED = 2000
 """Bootstrap draws of the seeds."""
@@ -32,6 +33,7 @@ class Comparison(NamedTuple):
     wins: np.ndarray
 
 
+@on_host
 def compare(a: np.ndarray, b: np.ndarray, *, axis: int = -1, level: float = 0.95) -> Comparison:
     """Compare errors `a` and `b` of the same shape, paired along `axis` (the seeds).
 

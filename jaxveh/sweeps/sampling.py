@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_seed, check_whole
+from jaxveh._core.host import on_host
 
 
 class Samples(NamedTuple):
@@ -18,6 +19,7 @@ class Samples(NamedTuple):
     columns: dict[str, np.ndarray]
 
 
+@on_host
 def latin_hypercube(count: int, *, seed: int = 0, **ranges: tuple[float, float]) -> Samples:
     """`count` points: for each name, one lies in each of `count` equal parts of its range (M. D. McKay et al. 1979).
 
@@ -34,6 +36,7 @@ def latin_hypercube(count: int, *, seed: int = 0, **ranges: tuple[float, float])
     return _scaled(qmc.LatinHypercube(len(ranges) or 1, rng=seed), count, ranges)
 
 
+@on_host
 def sobol(count: int, *, seed: int = 0, **ranges: tuple[float, float]) -> Samples:
     """`count` points, a power of two, of a scrambled Sobol sequence (I. M. Sobol 1967, A. B. Owen 1998); otherwise like
     `latin_hypercube`. Averages over them have an error of about 1 / `count`, over random points of 1 / sqrt(`count`)."""
