@@ -89,7 +89,7 @@ def _differences(place: str, given: Any, own: Any) -> Iterator[tuple[str, str, s
     jax.random are of an old kind or a new one."""
     if all(hasattr(one, "dtype") for one in (given, own)):
         if not jnp.issubdtype(own.dtype, jax.dtypes.prng_key) and (given.shape, given.dtype) != (own.shape, own.dtype):
-            yield place, *(f"{one.dtype}{list(one.shape)}" for one in (given, own))
+            yield place, f"{given.dtype}{list(given.shape)}", f"{own.dtype}{list(own.shape)}"
         return
     parts, needed = _parts(given), _parts(own)
     if parts.keys() != needed.keys() or (dataclasses.is_dataclass(own) and type(given) is not type(own)):
