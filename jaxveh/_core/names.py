@@ -53,7 +53,7 @@ def as_mapping(values, what: str = "values") -> dict:
         return dict(values.items())
     if hasattr(values, "_asdict"):
         return dict(values._asdict())
-    raise InputError(f"{what} = {type(values).__name__}: must be a NamedTuple or a mapping from names to values.")
+    raise InputError(f"{what} = {word_for(values)}: must be a NamedTuple or a mapping from names to values.")
 
 
 def as_names(values, what: str = "names") -> Any:

@@ -12,7 +12,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_flags
+from jaxveh._core.errors import InputError, check_flags, word_for
 
 FEW = 6
 """The largest number of members of a family that a message lists."""
@@ -24,7 +24,7 @@ def check_parts(module: eqx.Module) -> None:
         value = getattr(module, name)
         if not isinstance(value, kinds):
             wanted = " or ".join(_in_words(kind) for kind in kinds if kind is not type(None))
-            raise InputError(f"{type(module).__name__}.{name} = {type(value).__name__}: must be {wanted}.")
+            raise InputError(f"{type(module).__name__}.{name} = {word_for(value)}: must be {wanted}.")
 
 
 def check_static(module: eqx.Module) -> None:

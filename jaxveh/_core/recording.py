@@ -303,7 +303,7 @@ def check_recording(who: str, recording: Any) -> None:
     """Raise `InputError` unless it is a `Recording` of one drive; those that `jax.vmap` returns hold several."""
     if not isinstance(recording, Recording):
         raise InputError(
-            f"{who}: recording = {type(recording).__name__}: must be a Recording: jaxveh.Recording(time, {{name: values}}), or "
+            f"{who}: recording = {word_for(recording)}: must be a Recording: jaxveh.Recording(time, {{name: values}}), or "
             "the result of io.read_recording or simulate."
         )
     if np.ndim(recording.time) != 1:

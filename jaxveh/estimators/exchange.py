@@ -8,7 +8,7 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check_kind
+from jaxveh._core.errors import InputError, check_kind, word_for
 from jaxveh._core.names import as_pairs, record
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, Answer
@@ -50,9 +50,7 @@ class Exchange(AbstractMethod):
             raise InputError("Exchange: methods is empty: must name at least one.")
         for name, method in zip(self.names, self.methods, strict=True):
             if not isinstance(method, AbstractMethod):
-                raise InputError(
-                    f"Exchange: methods[{name!r}] = {type(method).__name__}: must be an estimators method."
-                )
+                raise InputError(f"Exchange: methods[{name!r}] = {word_for(method)}: must be an estimators method.")
         read = {need.channel for method in self.methods for need in method.needs}
         for channel, giver, name in self.gives:
             if giver not in self.names:

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, word_for
 from jaxveh._core.names import record
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.contract import Need, check_needs
@@ -50,7 +50,7 @@ def _linear_car(car: Any) -> SingleTrack:
     plain = _on_linear_tyres(car)
     if plain.steering.inputs != ("steer",):
         raise InputError(
-            f"open_loop: car.steering = {type(plain.steering).__name__}: needs {', '.join(plain.steering.inputs)}; must be a "
+            f"open_loop: car.steering = {word_for(plain.steering)}: needs {', '.join(plain.steering.inputs)}; must be a "
             "steering whose only input is steer."
         )
     return plain

@@ -25,7 +25,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.contracts import Checked, contract
-from jaxveh._core.errors import InputError, check_kind, check_one_of
+from jaxveh._core.errors import InputError, check_kind, check_one_of, word_for
 from jaxveh._core.estimated import Estimated
 from jaxveh._core.names import as_mapping, record
 from jaxveh._core.own_results import instance_of, several
@@ -205,7 +205,7 @@ def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: s
     check_one_of(f"{who}: method", name, methods)
     if not isinstance(source, CarSpecification):
         raise InputError(
-            f"{who}: source = {type(source).__name__}: must be an io.CarSpecification, which io.read_car reads, or a method."
+            f"{who}: source = {word_for(source)}: must be an io.CarSpecification, which io.read_car reads, or a method."
         )
     entry, place = methods[name], f"{who}: METHODS[{name!r}]"
     check_kind(place, entry, MethodOfCar, "Such as MethodOfCar(lambda car: Mine(), 'what it is', 'its source').")

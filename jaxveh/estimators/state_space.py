@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.bijectors import AbstractBijector
-from jaxveh._core.errors import InputError, check_at_least, check_kind
+from jaxveh._core.errors import InputError, check_at_least, check_kind, word_for
 from jaxveh._core.names import check_names, record, record_type
 from jaxveh._core.parameter import Where, strong
 from jaxveh._core.recording import check_recording
@@ -122,10 +122,10 @@ def _check_kinds(car, sensors, estimate) -> None:
     if not (estimate is None or callable(estimate)):
         raise InputError(f"estimate = {estimate!r}: must be a function, such as lambda car: (car.front.B, car.rear.B).")
     if not isinstance(car, AbstractVehicle):
-        raise InputError(f"state_space: car = {type(car).__name__}: must be a vehicle of jaxveh.vehicles.")
+        raise InputError(f"state_space: car = {word_for(car)}: must be a vehicle of jaxveh.vehicles.")
     if not isinstance(sensors, SensorSet):
         raise InputError(
-            f"state_space: sensors = {type(sensors).__name__}: must be a SensorSet, which states the noise of each channel for a "
+            f"state_space: sensors = {word_for(sensors)}: must be a SensorSet, which states the noise of each channel for a "
             "filter: sensors.esc(yaw_rate=0.005, a_y=0.1), or SensorSet(Gaussian({...})) with the devices' channels."
         )
 

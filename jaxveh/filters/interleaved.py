@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, word_for
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import first_failure
 from jaxveh.statespace import AbstractFilter, Row, StateSpace
@@ -123,7 +123,7 @@ def _check_turns(turns: Mapping[str, Turn]) -> None:
         raise InputError("interleave: turns is empty: must name at least one Turn.")
     for name, turn in turns.items():
         if not isinstance(turn, Turn):
-            raise InputError(f"interleave: turns[{name!r}] = {type(turn).__name__}: must be a filters.Turn.")
+            raise InputError(f"interleave: turns[{name!r}] = {word_for(turn)}: must be a filters.Turn.")
         turn.filter.check(turn.model)
 
 

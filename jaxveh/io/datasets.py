@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, word_for
 from jaxveh._core.labelled import Labelled, Variable
 from jaxveh._core.version import VERSION
 from jaxveh.io.optional import require
@@ -53,7 +53,7 @@ def of_dataset(kind: type, dataset: Any) -> Any:
     """Return the result of a `kind` from its dataset of `dataset_of`. **Raises** `InputError` for the dataset of another kind."""
     xarray = require("xarray", "reading a dataset")
     if not isinstance(dataset, xarray.Dataset):
-        raise InputError(f"{kind.__name__}.from_xarray: {type(dataset).__name__}: must be an xarray.Dataset.")
+        raise InputError(f"{kind.__name__}.from_xarray: {word_for(dataset)}: must be an xarray.Dataset.")
     return result_of(kind, arrays_of_dataset(dataset, f"{kind.__name__}.from_xarray"), f"{kind.__name__}.from_xarray")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_flags
+from jaxveh._core.errors import InputError, check_flags, word_for
 from jaxveh._core.names import as_mapping
 from jaxveh._core.recording import Recording, check_recording
 from jaxveh.io.canonical import canonical_unit
@@ -58,7 +58,7 @@ def from_frame(frame: Any) -> Recording:
     """
     pandas = require("pandas", "reading a data frame")
     if not isinstance(frame, pandas.DataFrame):
-        raise InputError(f"from_frame: {type(frame).__name__}: must be a pandas.DataFrame.")
+        raise InputError(f"from_frame: {word_for(frame)}: must be a pandas.DataFrame.")
     names = [str(name) for name in frame.columns]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
@@ -112,7 +112,7 @@ def write_frame(frame: Any, path: str | os.PathLike, *, overwrite: bool = False)
 
 def _estimate(data: Any) -> dict[str, Any]:
     if not all(hasattr(data, name) for name in ("time", "mean", "std")):
-        raise InputError(f"to_frame: {type(data).__name__} has no time, mean and std; give a recording or an estimate.")
+        raise InputError(f"to_frame: {word_for(data)} has no time, mean and std; give a recording or an estimate.")
     mean, std = as_mapping(data.mean, "mean"), as_mapping(data.std, "std")
     columns = {}
     for name, values in mean.items():

@@ -8,7 +8,7 @@ from typing import Any
 import equinox as eqx
 
 from jaxveh._core.contracts import Checked, contract
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, word_for
 from jaxveh._core.names import record_type
 from jaxveh._core.own_results import named_record, names, states
 from jaxveh._core.parameter import check_parameters
@@ -67,7 +67,7 @@ class OpenLoop(AbstractDriver):
 
     def __init__(self, manoeuvre: AbstractManoeuvre):
         if not isinstance(manoeuvre, AbstractManoeuvre):
-            raise InputError(f"OpenLoop.manoeuvre = {type(manoeuvre).__name__}: must be a manoeuvre or a driver.")
+            raise InputError(f"OpenLoop.manoeuvre = {word_for(manoeuvre)}: must be a manoeuvre or a driver.")
         self.manoeuvre, self.duration = manoeuvre, manoeuvre.duration
 
     @property

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check_positive, check_single
+from jaxveh._core.errors import InputError, check_positive, check_single, word_for
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.manoeuvres.base import DriverInputs
 from jaxveh.manoeuvres.driver import AbstractDriver, Motion, driver_state
@@ -61,7 +61,7 @@ class PathDriver(AbstractDriver):
     def __check_init__(self):
         for name, kind in (("path", AbstractPath), ("speed", AbstractSpeed)):
             if not isinstance(getattr(self, name), kind):
-                given = type(getattr(self, name)).__name__
+                given = word_for(getattr(self, name))
                 raise InputError(f"PathDriver.{name} = {given}: must be a {name} of jaxveh.manoeuvres.")
         check_single(**{"PathDriver.duration": self.duration})
         check_positive("PathDriver.duration", self.duration, "s")

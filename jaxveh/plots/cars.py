@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, word_for
 from jaxveh.io import CarSpecification
 from jaxveh.plots.car_outline import BESIDE, OVERHANG, WHEEL
 from jaxveh.plots.style import COLOURS, CYCLE, new_figure, style
@@ -28,9 +28,7 @@ def car(vehicle: AbstractVehicle | CarSpecification, *, figure: Any = None) -> A
     cars.
     """
     if not isinstance(vehicle, AbstractVehicle | CarSpecification):
-        raise InputError(
-            f"plots.car: vehicle = {type(vehicle).__name__}: must be a vehicle, or a car's file (io.read_car)."
-        )
+        raise InputError(f"plots.car: vehicle = {word_for(vehicle)}: must be a vehicle, or a car's file (io.read_car).")
     places = _places(vehicle)
     if any(np.ndim(number) for place in places for number in place):
         raise InputError("plots.car: a batch of cars: must be one, such as jax.tree.map(lambda leaf: leaf[0], cars).")

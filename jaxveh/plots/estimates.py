@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_flags, check_positive
+from jaxveh._core.errors import InputError, check_flags, check_positive, word_for
 from jaxveh._core.names import as_mapping, as_names, check_names
 from jaxveh._core.recording import Recording
 from jaxveh.plots.quantities import quantity
@@ -41,7 +41,7 @@ def check_estimate(who: str, estimate: Any, *fields: str) -> None:
     time."""
     if not all(hasattr(estimate, name) for name in ("time", *fields)):
         raise InputError(
-            f"{who}: estimate = {type(estimate).__name__}: must have time, {' and '.join(fields)}, as an Estimate of jaxveh.run."
+            f"{who}: estimate = {word_for(estimate)}: must have time, {' and '.join(fields)}, as an Estimate of jaxveh.run."
         )
     if np.ndim(estimate.time) != 1:
         raise InputError(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_finite, check_positive
+from jaxveh._core.errors import InputError, check_finite, check_positive, word_for
 from jaxveh.plots.style import COLOURS, legend, new_figure, style
 from jaxveh.plots.tyres import check_tyre, forces_at
 from jaxveh.tyres import AbstractTyre
@@ -47,9 +47,7 @@ def friction_ellipse(
     grid = forces_at(law, load, slip_angle * _dense_at_zero()[:, None], ratio[None, :])
     for name, values in (("longitudinal", grid.F_x), ("lateral", grid.F_y)):
         if not np.any(values):
-            raise InputError(
-                f"plots.friction_ellipse: law = {type(law).__name__} has no {name} force; it must have both."
-            )
+            raise InputError(f"plots.friction_ellipse: law = {word_for(law)} has no {name} force; it must have both.")
     with style():
         from matplotlib import colormaps
 

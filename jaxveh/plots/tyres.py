@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import InputError, check_positive, word_for
 from jaxveh.plots.style import CYCLE, legend, new_figure, style
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
 
@@ -108,9 +108,7 @@ def _varies(panel: Panel) -> bool:
 def check_tyre(who: str, law: Any) -> None:
     """Raise `InputError` for what is no tyre, and for several tyres in one, as `jax.vmap` returns them."""
     if not isinstance(law, AbstractTyre | AbstractDynamicTyre):
-        raise InputError(
-            f"{who}: law = {type(law).__name__}: must be a tyre, such as tyres.typical_mf_tyre or car.front."
-        )
+        raise InputError(f"{who}: law = {word_for(law)}: must be a tyre, such as tyres.typical_mf_tyre or car.front.")
     number = jnp.zeros(())
     try:
         found = eqx.filter_eval_shape(_evaluate, law, Contact(number, number, number + 1.0, speed=number + 1.0))

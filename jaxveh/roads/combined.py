@@ -6,7 +6,7 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, word_for
 from jaxveh.roads.base import AbstractRoad, Surface
 
 
@@ -27,7 +27,7 @@ class Combined(AbstractRoad):
         for name in ("friction", "grade", "bank", "height"):
             road = getattr(self, name)
             if not isinstance(road, AbstractRoad) and not (name in ("bank", "height") and road is None):
-                raise InputError(f"Combined.{name} = {type(road).__name__}: must be a road of jaxveh.roads.")
+                raise InputError(f"Combined.{name} = {word_for(road)}: must be a road of jaxveh.roads.")
 
     def at(self, s: Any, y: Any = 0.0) -> Surface:
         friction, shape = self.friction.at(s, y).friction, self.grade.at(s, y)

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_positive, check_single, check_whole, is_concrete
+from jaxveh._core.errors import InputError, check, check_positive, check_single, check_whole, is_concrete, word_for
 from jaxveh._core.parameter import check_parameters, positive, table
 from jaxveh.numerics import band_harmonics, gauss_markov_harmonics, sum_of_harmonics
 from jaxveh.roads.base import AbstractRoad, Surface, place, surface
@@ -93,9 +93,7 @@ class RandomRoad(AbstractRoad):
         for name in ("grade", "bank", "log_friction"):
             given = getattr(self, name)
             if given is not None and not isinstance(given, Variation):
-                raise InputError(
-                    f"RandomRoad.{name} = {type(given).__name__}: must be a Variation (roads.gauss_markov)."
-                )
+                raise InputError(f"RandomRoad.{name} = {word_for(given)}: must be a Variation (roads.gauss_markov).")
 
     def at(self, s: Any, y: Any = 0.0) -> Surface:
         s, y = place(s, y, self.friction)

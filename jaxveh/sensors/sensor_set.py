@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check_finite, check_kind, check_single
+from jaxveh._core.errors import InputError, check_finite, check_kind, check_single, word_for
 from jaxveh._core.names import check_names, record_type
 from jaxveh._core.parameter import parameter
 from jaxveh.sensors.low_pass import LowPass
@@ -50,7 +50,7 @@ class SensorSet(eqx.Module):
 
     def __check_init__(self):
         if not isinstance(self.noise, Gaussian):
-            raise InputError(f"SensorSet.noise = {type(self.noise).__name__}: must be a Gaussian by channel name.")
+            raise InputError(f"SensorSet.noise = {word_for(self.noise)}: must be a Gaussian by channel name.")
         check_kind("SensorSet.position", self.position, Position, "Such as sensors.Position(x=0.5).")
         if not (self.low_pass is None or isinstance(self.low_pass, LowPass)):
             raise InputError(f"SensorSet.low_pass = {self.low_pass!r}: must be a LowPass(cutoff_hz) or None.")

@@ -185,7 +185,7 @@ def _place_on_road(car: AbstractVehicle, road: Any) -> Travelling:
         return car
     if car.road is not None:
         raise InputError(
-            f"simulate: road = {type(road).__name__}: the car already travels on a road, {type(car.road).__name__}. "
+            f"simulate: road = {word_for(road)}: the car already travels on a road, {type(car.road).__name__}. "
             "Leave one of them out: simulate(car.vehicle, ..., road=road), or no road."
         )
     return Travelling(car.vehicle, road)

@@ -253,9 +253,7 @@ def check_told(filter: Any, model: Any) -> None:
         ("model", model, StateSpace, "a StateSpace, as returned by estimators.state_space"),
     ):
         if not isinstance(value, kind):
-            raise InputError(
-                f"{name} = {type(value).__name__}: must be {example}. The order is filter, model, recording."
-            )
+            raise InputError(f"{name} = {word_for(value)}: must be {example}. The order is filter, model, recording.")
 
 
 def check_model(who: str, model: Any) -> None:

@@ -58,7 +58,7 @@ class Prior(eqx.Module):
 
     def __init__(self, mean, law):
         if not hasattr(mean, "_fields"):
-            raise InputError(f"prior mean = {type(mean).__name__}: must be the state's NamedTuple.")
+            raise InputError(f"prior mean = {word_for(mean)}: must be the state's NamedTuple.")
         for name, value in mean._asdict().items():
             check_finite(f"prior mean of {name}", value)
         self.mean = jax.tree.map(float_array, mean)
@@ -152,7 +152,7 @@ class StateSpace(eqx.Module):
         if self.process_noise is not None:
             if not isinstance(self.process_noise, AbstractProcessNoise):
                 raise InputError(
-                    f"process_noise = {type(self.process_noise).__name__}: must be Continuous(law) (unit per root "
+                    f"process_noise = {word_for(self.process_noise)}: must be Continuous(law) (unit per root "
                     "second) or Discrete(law) (per step), or None."
                 )
             check_names("process noise", self.process_noise.law.names, self.states)

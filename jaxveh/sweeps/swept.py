@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, word_for
 from jaxveh._core.labelled import Labelled, Variable
 from jaxveh._core.names import check_names
 from jaxveh._core.overview import Lazy, Overview, count_of, missing_share, span
@@ -175,7 +175,7 @@ def arrays_of(result):
     named = named_leaves(result)
     if not named or any(not name for name in named):
         raise InputError(
-            f"run returned {type(result).__name__}: must be a mapping or a NamedTuple of arrays, such as "
+            f"run returned {word_for(result)}: must be a mapping or a NamedTuple of arrays, such as "
             '{"rmse": ..., "result": ...}.'
         )
     bad = [name for name, leaf in named.items() if not eqx.is_array_like(leaf)]

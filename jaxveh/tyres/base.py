@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.contracts import Checked, contract
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, word_for
 from jaxveh._core.own_results import names, of_kind, states
 from jaxveh._core.parameter import check_parameters
 from jaxveh._core.parameter_table import WithParameters
@@ -131,9 +131,9 @@ def need_slip_speed(contact: Contact, tyre: str):
 def need_static(name: str, tyre) -> None:
     """Raise `InputError` unless `tyre` is a tyre without states; wrappers accept only such tyres."""
     if not isinstance(tyre, AbstractTyre):
-        raise InputError(f"{name} = {type(tyre).__name__}: must be a tyre of jaxveh.tyres.")
+        raise InputError(f"{name} = {word_for(tyre)}: must be a tyre of jaxveh.tyres.")
     if isinstance(tyre, AbstractDynamicTyre):
-        raise InputError(f"{name} = {type(tyre).__name__}: must be a tyre without states of its own.")
+        raise InputError(f"{name} = {word_for(tyre)}: must be a tyre without states of its own.")
 
 
 def cornering_stiffness(tyre: AbstractTyre, contact: Contact) -> jax.Array:

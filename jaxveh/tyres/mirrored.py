@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, word_for
 from jaxveh.tyres.base import AbstractDynamicTyre, AbstractTyre, Contact, Forces
 
 ODD_INPUTS = ("slip_angle", "camber", "turn_slip", "lateral_slip")
@@ -32,7 +32,7 @@ class Mirrored(AbstractTyre):
     def __check_init__(self):
         if isinstance(self.tyre, AbstractDynamicTyre):
             raise InputError(
-                f"Mirrored.tyre = {type(self.tyre).__name__}: must be a tyre without states; mirror the tyre inside it."
+                f"Mirrored.tyre = {word_for(self.tyre)}: must be a tyre without states; mirror the tyre inside it."
             )
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_flags, path_of
+from jaxveh._core.errors import InputError, check_flags, path_of, word_for
 from jaxveh.io import kit, write_text
 from jaxveh.tyres.arctangent import Arctangent
 from jaxveh.tyres.base import AbstractTyre
@@ -47,7 +47,7 @@ def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", ov
     name = type(tyre).__name__
     if MODELS.get(name) is not type(tyre):
         raise InputError(
-            f"write_parameters: tyre = {name}: must be one of {', '.join(MODELS)}; for MFTyre use to_property_file."
+            f"write_parameters: tyre = {word_for(tyre)}: must be one of {', '.join(MODELS)}; for MFTyre use to_property_file."
         )
     lines = [f"# {line}".rstrip() for line in note.splitlines()]
     lines += ["# SI units and radians.", "[tyre]", f"model = {kit.toml_string(name)}"]

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_one_of
+from jaxveh._core.errors import InputError, check_one_of, word_for
 from jaxveh.io import PropertyFile, kit
 from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.property_file import DIMENSIONS, SIDES, from_property_file, size_of, version_of
@@ -97,7 +97,7 @@ def to_property_file(
     """
     if type(tyre) is not MFTyre:
         raise InputError(
-            f"to_property_file: tyre = {type(tyre).__name__}: must be an MFTyre; for other laws use tyres.write_parameters."
+            f"to_property_file: tyre = {word_for(tyre)}: must be an MFTyre; for other laws use tyres.write_parameters."
         )
     coefficients = list(_coefficients(tyre))
     if like is None:

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, is_concrete
+from jaxveh._core.errors import InputError, check, is_concrete, word_for
 from jaxveh._core.names import check_names, record, record_type
 from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.numerics import smooth_step
@@ -60,7 +60,7 @@ class AntiLock(AbstractVehicle):
             self.vehicle, "wheel_inertia"
         ):
             raise InputError(
-                f"AntiLock.vehicle = {type(self.vehicle).__name__}: must be a car with a drive and with wheel spin, such as a "
+                f"AntiLock.vehicle = {word_for(self.vehicle)}: must be a car with a drive and with wheel spin, such as a "
                 "SevenDOF or a FourteenDOF."
             )
         check_parameters(self)

@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import InputError, check_positive, word_for
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.base import AbstractVehicle, Motion, over_ground, with_batch_shape
 from jaxveh.vehicles.linear_handling import LinearSingleTrack
@@ -38,10 +38,10 @@ class KinematicCrawl(AbstractVehicle):
 
     def __check_init__(self):
         if not isinstance(self.vehicle, LinearSingleTrack):
-            raise InputError(f"KinematicCrawl.vehicle = {type(self.vehicle).__name__}: must be a LinearSingleTrack.")
+            raise InputError(f"KinematicCrawl.vehicle = {word_for(self.vehicle)}: must be a LinearSingleTrack.")
         if not self.vehicle.steering.front_alone:
             raise InputError(
-                f"KinematicCrawl.vehicle.steering = {type(self.vehicle.steering).__name__}: must steer only the front wheels. "
+                f"KinematicCrawl.vehicle.steering = {word_for(self.vehicle.steering)}: must steer only the front wheels. "
                 "Use the vehicle without KinematicCrawl: its own crawl_speed works with any steering."
             )
         check_positive("KinematicCrawl.below", self.below, "m/s")

@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import InputError, check_positive, word_for
 from jaxveh._core.names import check_names, record, record_type
 from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.roads import LEVEL, Ground
@@ -93,7 +93,7 @@ class AbstractOnTyres(AbstractTwoAxle):
             tyre = getattr(self, name)
             if not isinstance(tyre, AbstractTyre):
                 kind = type(self).__name__
-                raise InputError(f"{kind}.{name} = {type(tyre).__name__}: must be a tyre of jaxveh.tyres.")
+                raise InputError(f"{kind}.{name} = {word_for(tyre)}: must be a tyre of jaxveh.tyres.")
 
     @property
     @abc.abstractmethod

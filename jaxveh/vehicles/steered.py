@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check
+from jaxveh._core.errors import InputError, check, word_for
 from jaxveh._core.names import as_mapping, check_names, record, record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
@@ -60,10 +60,10 @@ class Steered(AbstractVehicle):
 
     def __check_init__(self):
         if not isinstance(self.vehicle, AbstractVehicle):
-            raise InputError(f"Steered.vehicle = {type(self.vehicle).__name__}: must be a vehicle of jaxveh.vehicles.")
+            raise InputError(f"Steered.vehicle = {word_for(self.vehicle)}: must be a vehicle of jaxveh.vehicles.")
         if "steer" not in self.vehicle.inputs:
             raise InputError(
-                f"Steered.vehicle = {type(self.vehicle).__name__}: its inputs are {', '.join(self.vehicle.inputs)}; "
+                f"Steered.vehicle = {word_for(self.vehicle)}: its inputs are {', '.join(self.vehicle.inputs)}; "
                 "steer must be one of them."
             )
         check_parameters(self)
@@ -111,7 +111,7 @@ class Steered(AbstractVehicle):
         if self.own_states:
             if moment is None:
                 raise InputError(
-                    f"Steered.vehicle = {type(self.vehicle).__name__}: has no front lateral force among its outputs "
+                    f"Steered.vehicle = {word_for(self.vehicle)}: has no front lateral force among its outputs "
                     "to deflect the steering; compliance must be None."
                 )
             spring = (u.steering_wheel / self.ratio - x.steer) / self.compliance

@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check, check_one_of
+from jaxveh._core.errors import InputError, check, check_one_of, word_for
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh._core.plain import plain_float
 from jaxveh.vehicles.base import AbstractVehicle
@@ -248,7 +248,7 @@ class AbstractSteeredByRoadWheels(AbstractVehicle):
     def __check_init__(self):
         if not isinstance(self.steering, AbstractSteering):
             raise InputError(
-                f"{type(self).__name__}.steering = {type(self.steering).__name__}: must be a steering of jaxveh.vehicles: "
+                f"{type(self).__name__}.steering = {word_for(self.steering)}: must be a steering of jaxveh.vehicles: "
                 f"{', '.join(kind.__name__ for kind in STEERINGS.values())}."
             )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, word_for
 from jaxveh._core.names import check_names, record, record_type
 from jaxveh._core.parts import check_parts
 from jaxveh.roads import LEVEL, AbstractRoad, Ground, under
@@ -29,7 +29,7 @@ class Travelling(AbstractVehicle):
 
     def __check_init__(self):
         if not (self.road is None or isinstance(self.road, AbstractRoad)):
-            raise InputError(f"Travelling.road = {type(self.road).__name__}: must be a road of jaxveh.roads, or None.")
+            raise InputError(f"Travelling.road = {word_for(self.road)}: must be a road of jaxveh.roads, or None.")
         check_parts(self)
 
     @property

@@ -1,5 +1,8 @@
 """A thing of a wrong kind is shown in the same words, `word_for`, wherever a message names it."""
 
+import ast
+from pathlib import Path
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -56,3 +59,48 @@ def test_they_are_the_same_everywhere(thing, place):
     with pytest.raises(InputError) as raised:
         PLACES[place](THINGS[thing])
     assert unlike.get((place, thing), WORDS[thing]) in str(raised.value)
+
+
+ROOT = Path(jaxveh.__file__).parent
+
+
+def is_name_of_a_type(node):
+    """Whether an expression is `type(...).__name__`."""
+    return (
+        isinstance(node, ast.Attribute)
+        and node.attr == "__name__"
+        and isinstance(node.value, ast.Call)
+        and getattr(node.value.func, "id", "") == "type"
+    )
+
+
+def shown_by_their_type(tree):
+    """Lines of messages that show a thing of a wrong kind, `name = thing: must be`, by the name of its type, in place of
+    `word_for`: of the None that is given for a filter it says `NoneType`, of an array not its shape."""
+    for function in ast.walk(tree):
+        if not isinstance(function, ast.FunctionDef):
+            continue
+        names = {
+            target.id
+            for node in ast.walk(function)
+            if isinstance(node, ast.Assign) and is_name_of_a_type(node.value)
+            for target in node.targets
+            if isinstance(target, ast.Name)
+        }
+        for text in (node for node in ast.walk(function) if isinstance(node, ast.JoinedStr)):
+            for before, part, after in zip([None, *text.values], text.values, [*text.values[1:], None], strict=False):
+                said = isinstance(part, ast.FormattedValue) and (
+                    is_name_of_a_type(part.value) or getattr(part.value, "id", "") in names
+                )
+                words = [one.value if isinstance(one, ast.Constant) else "" for one in (before, after)]
+                if said and (words[0].endswith((" = ", "returned ")) or (words[0] and words[1].startswith(": must"))):
+                    yield part.lineno
+
+
+def test_no_message_shows_a_thing_by_the_name_of_its_type():
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in sorted(ROOT.rglob("*.py"))
+        for line in shown_by_their_type(ast.parse(path.read_text(encoding="utf-8")))
+    ]
+    assert not found

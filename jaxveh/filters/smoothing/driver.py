@@ -6,7 +6,7 @@ from typing import Any
 
 import equinox as eqx
 
-from jaxveh._core.errors import InputError, check_flags
+from jaxveh._core.errors import InputError, check_flags, word_for
 from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
 from jaxveh.filters.particle import AbstractParticleFilter
@@ -55,7 +55,7 @@ def smooth(
         found = _particles(filter, model, rows, kit.key_for(filter, key), method)
     elif method is not None:
         raise InputError(
-            f"method = {type(method).__name__}: is for particle filters; {type(filter).__name__} has a smoother of its own."
+            f"method = {word_for(method)}: is for particle filters; {type(filter).__name__} has a smoother of its own."
         )
     else:
         found = rauch_tung_striebel(filter, model, rows)

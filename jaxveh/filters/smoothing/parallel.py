@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check_flags
+from jaxveh._core.errors import InputError, check_flags, word_for
 from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import first_failure
@@ -40,7 +40,7 @@ def smooth_parallel(
     declared = kit.smoothing_of(filter) is Smoothing.gaussian
     if not declared or filter.linearisations is None or not kit.innermost(filter).form.keeps_matrix:
         raise InputError(
-            f"smooth_parallel: {type(filter).__name__}: must be Kalman() or Iterated(...), not wrapped, with Covariance()."
+            f"smooth_parallel: {word_for(filter)}: must be Kalman() or Iterated(...), not wrapped, with Covariance()."
         )
     model = strong(model)
     filter.check(model)

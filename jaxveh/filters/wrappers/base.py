@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh._core.contracts import contract
-from jaxveh._core.errors import InputError, check_positive, real_array
+from jaxveh._core.errors import InputError, check_positive, real_array, word_for
 from jaxveh._core.own_results import instance_of, not_none
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
@@ -98,14 +98,14 @@ def check_independent(who: str, model: StateSpace) -> None:
     """Raise `InputError` unless the measurement noise is Gaussian with one standard deviation per channel."""
     kit.check_fixed(who, model.measurement_noise, "Use the inner filter without this wrapper, or a particle filter.")
     if not isinstance(model.measurement_noise, Gaussian):
-        kind = type(model.measurement_noise).__name__
+        kind = word_for(model.measurement_noise)
         raise InputError(f"{who}: the measurement noise is {kind}: must be Gaussian, a standard deviation per channel.")
 
 
 def check_has_levels(who: str, model: StateSpace) -> None:
     """Raise `InputError` unless the measurement noise has a standard deviation per channel, as a Gaussian or a Gaussian part."""
     if not isinstance(model.measurement_noise, Gaussian | CauchyGaussianMixture):
-        kind = type(model.measurement_noise).__name__
+        kind = word_for(model.measurement_noise)
         raise InputError(
             f"{who}: the measurement noise is {kind}: must be Gaussian, a standard deviation per channel. Let the wrapper refuse "
             "it first: derive it from kit.AbstractReweighting or kit.AbstractLearnedNoise."

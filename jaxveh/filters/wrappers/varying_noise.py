@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check_one_of
+from jaxveh._core.errors import InputError, check_one_of, word_for
 from jaxveh._core.names import check_names
 from jaxveh.statespace import AbstractFilter, AbstractWrapper, Continuous, Discrete, Gaussian, Gradient, StateSpace, kit
 
@@ -62,7 +62,7 @@ class VaryingNoise(AbstractWrapper):
         check_names("VaryingNoise: inputs", [name for _, name in (*self.measurement, *self.process)], model.inputs)
         laws = [("measurement noise", model.measurement_noise)] if self.measurement else []
         if self.process:
-            kind = type(model.process_noise).__name__
+            kind = word_for(model.process_noise)
             if not isinstance(model.process_noise, Continuous | Discrete):
                 raise InputError(f"VaryingNoise: the process noise is {kind}: must be Continuous or Discrete.")
             laws.append(("process noise", model.process_noise.law))
@@ -72,7 +72,7 @@ class VaryingNoise(AbstractWrapper):
             )
         for what, law in laws:
             if not isinstance(law, Gaussian):
-                kind = type(law).__name__
+                kind = word_for(law)
                 raise InputError(
                     f"VaryingNoise: the {what} is {kind}: must be Gaussian, one standard deviation per field."
                 )

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check, check_one_of, is_whole, kind_of_inner
+from jaxveh._core.errors import InputError, check, check_one_of, is_whole, kind_of_inner, word_for
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.filters.particle import AbstractParticleFilter
 from jaxveh.filters.wrappers.base import (
@@ -107,7 +107,7 @@ class HaarParticles(AbstractHaar):
         kit.check_fixed("HaarParticles", law, "Use the particle filter without this wrapper.")
         if not isinstance(law, Gaussian | CauchyGaussianMixture):
             raise InputError(
-                f"HaarParticles: the measurement noise is {type(law).__name__}: must be Gaussian, one standard deviation per "
+                f"HaarParticles: the measurement noise is {word_for(law)}: must be Gaussian, one standard deviation per "
                 "channel, or CauchyGaussianMixture."
             )
         self.inner.check(model)
