@@ -197,7 +197,7 @@ def test_records():
     assert record("A", {"x": 1, "y": 2})._asdict() == as_mapping(record("A", {"x": 1, "y": 2})) == {"x": 1, "y": 2}
     with pytest.raises(InputError, match=r"A has the field\(s\) x twice"):
         record_type("A", ["x", "y", "x"])
-    with pytest.raises(InputError, match="scales = float: must be a NamedTuple or a mapping"):
+    with pytest.raises(InputError, match="scales = [0-9.]+: must be a NamedTuple or a mapping"):
         as_mapping(1.0, "scales")
 
 

@@ -57,7 +57,7 @@ def test_frames_written_and_read(tmp_path, estimate, suffix):
 
 
 def test_what_is_no_frame(tmp_path, estimate):
-    with pytest.raises(InputError, match="int has no time, mean and std"):
+    with pytest.raises(InputError, match="3 has no time, mean and std"):
         io.to_frame(3)
     with pytest.raises(InputError, match=r"v_y has shape \(1,\); it must be that of time, \(2,\)"):
         io.to_frame(estimate._replace(mean=Report(jnp.ones(1), jnp.ones(2))))

@@ -215,11 +215,11 @@ STEADY = manoeuvres.SteadySpeed(20.0)
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: OpenLoop(3.0), r"OpenLoop\.manoeuvre = float: must be a manoeuvre or a driver"),
-        (lambda: SpeedControl(None, MASS), r"OpenLoop\.manoeuvre = NoneType"),
+        (lambda: OpenLoop(3.0), r"OpenLoop\.manoeuvre = [0-9.]+: must be a manoeuvre or a driver"),
+        (lambda: SpeedControl(None, MASS), r"OpenLoop\.manoeuvre = None"),
         (lambda: SpeedControl(manoeuvres.step_steer(20.0, 0.1), -1.0), r"SpeedControl\.mass = -1\.0: must be positive"),
-        (lambda: PathDriver(path=3.0, speed=STEADY, duration=5.0), r"PathDriver\.path = float: must be a path"),
-        (lambda: PathDriver(path=manoeuvres.Straight(), speed=20.0, duration=5.0), r"PathDriver\.speed = float"),
+        (lambda: PathDriver(path=3.0, speed=STEADY, duration=5.0), r"PathDriver\.path = [0-9.]+: must be a path"),
+        (lambda: PathDriver(path=manoeuvres.Straight(), speed=20.0, duration=5.0), r"PathDriver\.speed = 20.0: must"),
         (lambda: manoeuvres.iso_lane_change(preview_time=0.0), r"PathDriver\.preview_time = 0\.0: must be positive"),
         (lambda: manoeuvres.steady_circle(40.0, -1.0), r"speed = -1\.0: must be between 0 and 150 m/s"),
     ],

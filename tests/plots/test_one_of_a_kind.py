@@ -64,7 +64,7 @@ def test_one_estimate(draw):
         InputError, match=r"estimate.time has shape \(3, 10\): must be \(T,\), one run. Take one of several"
     ):
         draw(types.SimpleNamespace(time=jnp.ones((3, 10)), mean=run, std=run, info=run))
-    with pytest.raises(InputError, match="estimate = int: must have time, (mean and std|info)"):
+    with pytest.raises(InputError, match="estimate = [0-9.]+: must have time, (mean and std|info)"):
         draw({"a": 1} if draw is plots.estimate else 1)
 
 

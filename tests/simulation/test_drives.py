@@ -148,7 +148,7 @@ def test_the_implicit_solver_and_equal_steps_agree():
 def test_unknown_solvers_and_roads_are_refused():
     with pytest.raises(InputError, match=r"solver = 'rk4': must be one of 'auto', 'explicit', 'implicit'"):
         simulate(light(), straight(), solver="rk4")
-    with pytest.raises(InputError, match="Travelling.road = int: must be a road"):
+    with pytest.raises(InputError, match="Travelling.road = [0-9.]+: must be a road"):
         simulate(light(), straight(), road=3)
     with pytest.raises(InputError, match="must be a manoeuvre or a driver"):
         simulate(light(), 3)

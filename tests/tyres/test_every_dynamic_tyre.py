@@ -341,7 +341,7 @@ def test_a_vehicle_carries_the_states():
         (lambda: tyres.Relaxed(brush()), r"Relaxed.sigma_x, sigma_y = None: Brush has no relaxation lengths"),
         (lambda: tyres.Relaxed(brush(), 0.2, of="time"), r"Relaxed.of = 'time': must be one of 'slip', 'force'"),
         (lambda: tyres.Relaxed(TYRES["LuGre"](), 0.2), r"Relaxed.tyre = LuGre: must be a tyre without states"),
-        (lambda: tyres.Relaxed(3.0, 0.2), r"Relaxed.tyre = float: must be a tyre"),
+        (lambda: tyres.Relaxed(3.0, 0.2), r"Relaxed.tyre = [0-9.]+: must be a tyre"),
         (lambda: tyres.LuGre(-1.0, 1.0, 1.0, 0.8, 6.0), r"LuGre.stiffness_x = -1.0: must be positive"),
         (lambda: tyres.LuGre(1.0, 1.0, 1.0, 0.8, 6.0, viscous=-1.0), r"LuGre.viscous = -1.0: must be at least 0"),
         (lambda: tyres.LuGre(1.0, 1.0, 1.0, 0.8, 6.0, exponent=0.0), r"LuGre.exponent = 0.0: must be positive"),

@@ -262,9 +262,9 @@ def test_the_roads_friction_can_be_estimated():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: tyres.FrictionEllipse(lateral(), 3.0), "FrictionEllipse.across = float: must be a tyre"),
-        (lambda: tyres.FrictionEllipse(None, lateral()), "FrictionEllipse.along = NoneType: must be a tyre"),
-        (lambda: tyres.LongitudinalLaw(80e3), "LongitudinalLaw.law = float: must be a tyre"),
+        (lambda: tyres.FrictionEllipse(lateral(), 3.0), "FrictionEllipse.across = [0-9.]+: must be a tyre"),
+        (lambda: tyres.FrictionEllipse(None, lateral()), "FrictionEllipse.along = None: must be a tyre"),
+        (lambda: tyres.LongitudinalLaw(80e3), "LongitudinalLaw.law = [0-9.]+: must be a tyre"),
         (lambda: tyres.OnRoad(lateral(), -0.5), "OnRoad.friction = -0.5: must be positive"),
         (
             lambda: tyres.OnRoad(tyres.Relaxed(lateral(), 0.1), 0.5),
@@ -272,7 +272,7 @@ def test_the_roads_friction_can_be_estimated():
         ),
         (lambda: tyres.Similarity(lateral(), 0.0), "Similarity.reference_load = 0.0: must be positive"),
         (lambda: tyres.Similarity(lateral(), LOAD, -1.0), "Similarity.stiffness_load = -1.0"),
-        (lambda: tyres.Similarity("law", LOAD), "Similarity.tyre = str: must be a tyre"),
+        (lambda: tyres.Similarity("law", LOAD), "Similarity.tyre = 'law': must be a tyre"),
         (lambda: tyres.Similarity(lateral(), LOAD).forces(Contact(0.1)), "contact.load = None: Similarity"),
     ],
 )

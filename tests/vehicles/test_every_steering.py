@@ -367,7 +367,7 @@ BAD = {
     "FourWheelSteering.rear_ratio = 9.0: must be between -5 and 5": lambda: vehicles.FourWheelSteering(9.0),
     "FourWheelSteering.fast_ratio = -7.0: must be between": lambda: vehicles.FourWheelSteering(0.0, fast_ratio=-7.0),
     "middle_speed = 0.0: must be positive": lambda: vehicles.FourWheelSteering(0.0, middle_speed=0.0),
-    "SevenDOF.steering = str: must be a steering of jaxveh.vehicles: FrontSteering, Ackermann": lambda: dataclasses.replace(
+    "SevenDOF.steering = 'rear': must be a steering of jaxveh.vehicles: FrontSteering, Ackermann": lambda: dataclasses.replace(
         CARS["SevenDOF"].make(), steering="rear"
     ),
 }  # fmt: skip

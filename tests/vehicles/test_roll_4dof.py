@@ -187,7 +187,7 @@ def test_slopes_of_a_braked_car_are_finite(brake):
         ("grip", 0.0, r"Roll4DOF\.grip = 0\.0: must be positive"),
         ("roll_stiffness_rear", -3e4, r"Roll4DOF\.roll_stiffness_rear = -30000\.0: must be positive"),
         ("cg_height", 7.0, r"or the body falls over"),
-        ("rear", 3.0, r"Roll4DOF\.rear = float: must be a tyre"),
+        ("rear", 3.0, r"Roll4DOF\.rear = [0-9.]+: must be a tyre"),
     ],
 )
 def test_bad_input_is_named(field, value, message):

@@ -130,7 +130,7 @@ def test_slopes_of_a_braked_car_are_finite(brake):
         ("mass", -1.0, r"SingleTrack3DOF\.mass = -1\.0: must be positive"),
         ("cg_height", 0.0, r"SingleTrack3DOF\.cg_height = 0\.0"),
         ("grip", float("nan"), r"SingleTrack3DOF\.grip = nan"),
-        ("rear", 3.0, r"SingleTrack3DOF\.rear = float: must be a tyre"),
+        ("rear", 3.0, r"SingleTrack3DOF\.rear = [0-9.]+: must be a tyre"),
     ],
 )
 def test_bad_input_is_named(field, value, message):

@@ -169,7 +169,7 @@ def test_travelling_carries_it_along():
         ("track_rear", -1.5, r"TwoTrack2DOF\.track_rear = -1\.5"),
         ("cg_height", float("nan"), r"TwoTrack2DOF\.cg_height = nan"),
         ("front_roll_share", 1.2, r"TwoTrack2DOF\.front_roll_share = 1\.2: must be between 0 and 1"),
-        ("rear", None, r"TwoTrack2DOF\.rear = NoneType: must be a tyre"),
+        ("rear", None, r"TwoTrack2DOF\.rear = None: must be a tyre"),
         ("crawl_speed", 0.0, r"TwoTrack2DOF\.crawl_speed = 0\.0"),
     ],
 )
