@@ -12,6 +12,7 @@ from jaxveh import InputError, Recording
 from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
 from jaxveh._core.recording import gap_to_fill
+from jaxveh.cli.several_logs import LACKS
 from jaxveh.diagnostics import kit
 from jaxveh.estimators import sideslip
 from jaxveh.io import kit as io
@@ -41,7 +42,7 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
     if missing:
         likely = io.likely_words(missing, recording.names)
         raise InputError(
-            f"the log has no {', '.join(missing)}; it must have {', '.join(NEEDED)}.{' ' if likely else ''}{likely} Map their "
+            f"{LACKS}{', '.join(missing)}; it must have {', '.join(NEEDED)}.{' ' if likely else ''}{likely} Map their "
             "columns with --channels (jaxveh schema channels)."
         )
     for name in (*INPUTS, *(("steer",) if "steer" in recording else ())):

@@ -112,12 +112,15 @@ def _check_one_car(drives: Sequence[Drive]) -> None:
                 scales[drive.log] = finding.values["scale"]
     if len(scales) < 2:
         return
-    small, large = min(scales, key=lambda log: scales[log]), max(scales, key=lambda log: scales[log])
+    order = sorted(scales, key=lambda log: scales[log])
+    small, large = order[0], order[-1]
     if scales[large] > UNLIKE * scales[small]:
+        cut = max(range(1, len(order)), key=lambda k: scales[order[k]] / scales[order[k - 1]])
+        alike = " and ".join(", ".join(log.name for log in group) for group in (order[:cut], order[cut:]))
         raise InputError(
             f"{large}: looks like a log of another car than {small}: in gentle turns its steer is {scales[large]:.2f} times the "
-            f"steer that the car of the file needs, in the other {scales[small]:.2f} times. Use logs of one car; --anyway "
-            "continues."
+            f"steer that the car of the file needs, in the other {scales[small]:.2f} times. Alike are {alike}. "
+            "Run the program once for each car, with its own --vehicle; if all are of one car, --anyway continues."
         )
 
 

@@ -9,6 +9,9 @@ from typing import Any
 
 from jaxveh import FilterError, InputError
 
+LACKS = "the log has no "
+"""What the reason of a log without a channel says."""
+
 
 class SeveralLogs:
     """The `logs` of one call, and the errors of those that were `refused`; the error of a single log is raised at once."""
@@ -48,8 +51,12 @@ class SeveralLogs:
 
     def check_some(self) -> None:
         """Raise an error with all reasons if every log was refused."""
-        if len(self.refused) == len(self.logs):
-            self.check_all()
+        if len(self.refused) < len(self.logs):
+            return
+        reasons = self.reasons().values()
+        parts = len(self.logs) > 1 and all(LACKS in one for one in reasons)
+        remedy = " If they are the messages of one drive, give the folder that holds them, alone." if parts else ""
+        raise self._error(" ".join(reasons) + remedy)
 
     def conclude(self) -> None:
         """Raise an error, which counts the logs and has all reasons, if some were refused: after the others are written."""

@@ -14,6 +14,7 @@ from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import ChannelMap
 from jaxveh.io.csv_layout import BLANKS, COMMENT, Layout, find_layout, with_numbers
+from jaxveh.io.haltech import is_haltech, open_haltech
 from jaxveh.io.log import TableLog
 from jaxveh.io.naming import split_unit
 from jaxveh.io.optional import require
@@ -29,6 +30,8 @@ def open_csv(path: Path, channels: ChannelMap | None) -> TableLog:
     The channel map gives what is not to be searched for. What was assumed is told in a `JaxvehWarning`. Of several columns
     with one name, each can be loaded with its number, such as `speed (column 14)`.
     """
+    if is_haltech(path):
+        return open_haltech(path, channels)
     table = read_columns(path, channels)
     more = [one for one in with_numbers(table.headings) if one not in table.headings]
     log = TableLog(path, [*table.headings, *more], table.cells.__getitem__, table.units, "", channels, table.point)

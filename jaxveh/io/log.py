@@ -17,6 +17,7 @@ from jaxveh.io.decimals import decimal
 from jaxveh.io.likely_names import MOST_LIKELY, likely_names, unit_of_ending
 from jaxveh.io.naming import check_known, listing, split_unit
 from jaxveh.io.repeats import without_repeats
+from jaxveh.io.split_stamps import nanoseconds_of, split_stamps
 from jaxveh.io.stamps import seconds
 from jaxveh.io.toml import shorten
 from jaxveh.io.units import convert, is_unit
@@ -92,7 +93,8 @@ class TableLog(Log):
         self._units = dict(plain.values())
         time = channels.time if channels else None
         time_name = self._find_time(time) if channels is None or channels.shares_time else None
-        self.names = tuple(name for name in self._heading if name != time_name)
+        part = None if time_name is None else nanoseconds_of(time_name, self._heading)
+        self.names = tuple(name for name in self._heading if name not in (time_name, part))
         self._time = None if time_name is None else self._stamps(time_name, time)
 
     def column(self, name: str, group: int | None = None) -> Column:
@@ -130,6 +132,15 @@ class TableLog(Log):
             for name in (wanted, *self._heading):
                 if name in self._heading and name.casefold() == wanted:
                     return name
+        pairs = split_stamps(self._heading)
+        if len(pairs) == 1:
+            return pairs[0][0]
+        if pairs:
+            shown = "; ".join(f"{seconds} and {part}" for seconds, part in pairs)
+            raise InputError(
+                f"{self.path}: several pairs of columns are seconds and nanoseconds of a time ({shown}). Name the seconds of "
+                f'one in a channel map: time = "{pairs[0][0]}".'
+            )
         alike = likely_names("time", self._heading)
         first = f" {', '.join(alike[:MOST_LIKELY])} may be it." if alike else ""
         raise InputError(
@@ -151,6 +162,9 @@ class TableLog(Log):
                 check_ending(what, told, unit, "s")
             stamps = self._values(name) if told is None else apply(told, self._values(name))
             stamps = convert(stamps, unit, "s", f"{self.path}: {name}") if is_unit(unit) else stamps
+            part = nanoseconds_of(name, self._heading)
+            if part is not None and (told is None or (told.scale, told.offset) == (1.0, 0.0)):
+                stamps = stamps + 1e-9 * self._values(part)
         if stamps.size == 0:
             raise InputError(f"{self.path}: the log is empty: it has columns but no row.")
         return stamps

@@ -17,6 +17,7 @@ from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
 from jaxveh.io.csv_log import open_csv, write_csv
 from jaxveh.io.files import check_readable, check_suffix, replacing_file
+from jaxveh.io.folder_log import FolderLog
 from jaxveh.io.likely_names import MOST_LIKELY, likely_names
 from jaxveh.io.log import Column, Log, apply, check_ending
 from jaxveh.io.mat_log import open_mat
@@ -105,18 +106,20 @@ def read_recording(
     method: str = "linear",
 ) -> Recording:
     """Read a log: text (`.csv`, `.txt`, `.tsv`, `.dat`), `.parquet`, `.mf4` or `.mdf` (also as `.dat`), MATLAB's `.mat` (structs
-    included), `.mcap` (topics of JSON messages), NetCDF 4 (`.nc`), or a VBOX's `.vbo`.
+    included), `.mcap` (topics of JSON messages), NetCDF 4 (`.nc`), a VBOX's `.vbo`, or a folder with a file for each message or
+    device.
 
     **Arguments**: `channels`: a channel map or the path of one (see `io.channel_map.CHANNEL_MAP_SCHEMA`); without it every column
-    is a channel with its own name, and time is the column `time`, `timestamps`, `timestamp` or `t`; columns that are no numbers
-    are left out with a warning, unless they have the name of a known channel. `raster`: the name
-    of a channel whose samples become the rows; the others are filled there by `method` (`linear`, `hold`; `io.resample`).
+    is a channel with its own name, and time is the column `time`, `timestamps`, `timestamp` or `t`, or two with seconds and
+    nanoseconds (header.stamp.secs and header.stamp.nsecs); columns that are no numbers are left out with a warning, unless
+    they have the name of a known channel. `raster`: the name of a channel whose samples become the rows; the others are filled
+    there by `method` (`linear`, `hold`; `io.resample`).
 
     **Units**: those of the channel map, otherwise those of the file (Parquet: the field's metadata `unit`; MDF4: the channel's
     unit; MATLAB: `Units` beside the data; text: a line of units below the names; text and Parquet: `name [unit]` or
     `name (unit)`), otherwise SI. Channels of `io.CANONICAL` are converted to SI; other channels keep their unit.
 
-    **Time base**: MDF4 groups, MATLAB structs and MCAP topics of different rasters are merged, not resampled: a row for every
+    **Time base**: MDF4 groups, MATLAB structs, MCAP topics and the files of a folder are merged, not resampled: a row for every
     time stamp, NaN where a sensor has no sample. Time stamps keep the log's own time, in seconds, on the host in float64;
     channels have JAX's float type. Dates become seconds since 1970, times of day seconds.
 
@@ -124,7 +127,8 @@ def read_recording(
     they are NaN in rows without a satellite.
 
     **Text** may have lines above the names of the columns, a line of units below them, `,`, `;`, tabs, `|` or blanks between
-    cells, and decimal commas. What was assumed (lines above that are not read, an encoding) is told in a `JaxvehWarning`.
+    cells, and decimal commas; it may be an export of Haltech's NSP. What was assumed (lines above that are not read, an
+    encoding) is told in a `JaxvehWarning`.
 
     **Raises** `InputError` naming file, column, row, value and remedy: a missing file, an unknown suffix, a broken file, an
     empty log, an unknown column, a unit of another dimension, a cell that is not a number, time that does not increase.
@@ -149,10 +153,11 @@ def _read(
         raise InputError(
             f"{path}: suffix {path.suffix!r} is not read: {advice}; a log must end in one of {', '.join(_OPEN)}."
         )
-    suffix = check_suffix(path, _OPEN, "log")
-    check_readable(path)
+    suffix = "" if path.is_dir() else check_suffix(path, _OPEN, "log")
+    if suffix:
+        check_readable(path)
     chosen = channels if isinstance(channels, ChannelMap) or channels is None else read_channel_map(channels)
-    with contextlib.closing(_OPEN[suffix](path, chosen)) as log:
+    with contextlib.closing(_OPEN[suffix](path, chosen) if suffix else FolderLog(path, chosen, _OPEN)) as log:
         as_saved = as_saved and log.as_saved
         if as_saved:
             loaded = {name: log.column(name) for name in log.names}

@@ -8,8 +8,10 @@ import pytest
 from programs import columns, run, write_log
 
 from jaxveh import InputError, Recording, estimators, io
+from jaxveh.cli.drives import Drive, _check_one_car
 from jaxveh.cli.log_errors import check_trusted, read_by
 from jaxveh.cli.quantity_options import QUANTITIES
+from jaxveh.cli.several_logs import LACKS, SeveralLogs
 from jaxveh.diagnostics import LogFinding, check_log
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "estimators"))
@@ -110,3 +112,35 @@ def test_a_sign_that_two_channels_disagree_about_suspects_both(wrong, suspects):
     log = Recording(time, {name: table[name] * (-1 if name == wrong else 1) for name in kept}, {})
     errors = [one for one in check_log(log) if one.severity == "error"]
     assert [one.suspects for one in errors] == [suspects]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_logs_of_two_cars_are_told_apart(seed):
+    """The message names the logs of each car: within one the steer scales differ by at most 1.2, between them by 1.5."""
+    rng = np.random.default_rng(seed)
+    cars = [[Path(f"{car}{k}.csv") for k in range(rng.integers(1, 4))] for car in "ab"]
+    scales = {log: size * rng.uniform(1.0, 1.2) for size, logs in zip((0.8, 1.5), cars, strict=True) for log in logs}
+    finding = lambda scale: LogFinding("ok", "steer", "", {"scale": scale, "correlation": 0.99})
+    drives = [Drive(log, LOG, [finding(scale)]) for log, scale in scales.items()]
+    order = [drives[k] for k in rng.permutation(len(drives))]
+    with pytest.raises(InputError, match=r"Run the program once for each car, with its own --vehicle") as told:
+        _check_one_car(order)
+    groups = str(told.value).split("Alike are ")[1].split(". Run")[0].split(" and ")
+    assert [set(group.split(", ")) for group in groups] == [{log.name for log in logs} for logs in cars]
+    _check_one_car([drive for drive in order if drive.log in cars[0]])
+
+
+def test_logs_that_may_be_the_messages_of_one_drive_are_told_so(tmp_path):
+    """Each lacks what the other has; one alone, or two that lack nothing, are told nothing."""
+    logs = tmp_path / "esp.csv", tmp_path / "wheels.csv"
+    several, single = SeveralLogs(logs), SeveralLogs(logs[:1])
+    for one, log in ((several, logs[0]), (several, logs[1]), (single, logs[0])):
+        one.refused[log] = InputError(f"{log}: {LACKS}v_x; it must have v_x.")
+    for one, told in ((several, True), (single, False)):
+        with pytest.raises(InputError) as raised:
+            one.check_some()
+        assert ("give the folder that holds them" in str(raised.value)) == told
+    several.refused[logs[0]] = InputError("esp.csv: is broken.")
+    with pytest.raises(InputError) as raised:
+        several.check_some()
+    assert "folder" not in str(raised.value)
