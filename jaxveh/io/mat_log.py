@@ -1,4 +1,5 @@
-"""MATLAB's `.mat` files as logs: vectors beside a time vector, structs with `Time` and `Data`, Simulink's structure with time."""
+"""MATLAB's `.mat` files as logs: vectors beside a time vector, structs with `Time` and `Data`, Simulink's structure with time,
+ControlDesk's axes and traces."""
 
 from __future__ import annotations
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh.io.channel_map import Channel, ChannelMap
+from jaxveh.io.control_desk import traces_of
 from jaxveh.io.log import TIME_NAMES, apply, check_ending
 from jaxveh.io.mat_elements import Unread
 from jaxveh.io.mat_file import read_mat
@@ -91,6 +93,14 @@ def _of_struct(
     node: Mapping[str, Any], path: str, short: str, time: np.ndarray | None, clocks: Clocks, seen: dict[str, str]
 ) -> Iterator[Leaf]:
     below = lambda name: f"{path}.{name}" if path else name
+    if not clocks.named and (traces := traces_of(node)) is not None:
+        for axis, clock, number, trace in traces:
+            if (own := _vector(clock["Data"])) is not None:
+                seen[f"{below('X')}[{axis}].Data"] = "time"
+                place, called = f"{below('Y')}[{number}]", _text(trace, NAME_NAMES).strip('"') or f"Y[{number}]"
+                seconds = convert(own, unit, "s", place) if is_unit(unit := _text(clock, UNIT_NAMES)) else own
+                yield from _leaves(trace["Data"], place, called, seconds, clocks, seen, _text(trace, UNIT_NAMES))
+        return
     name = next((one for wanted in TIME_NAMES for one in node if one.casefold() == wanted), None)
     own = None if name is None or (clocks.named and not path) else _vector(node[name])
     if own is not None and name is not None:

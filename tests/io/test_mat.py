@@ -220,3 +220,51 @@ def test_version_4_is_told_with_who_writes_it(tmp_path, format):
     (tmp_path / "log.mat").write_bytes(head + b"time\0" + numbers.astype(f"{format}f8").tobytes())
     with pytest.raises(InputError, match=r"it is of version 4, as Dymola and OpenModelica .*with -v7\)\.$"):
         io.read_recording(tmp_path / "log.mat")
+
+
+def recorded(axes, traces):
+    """A capture of ControlDesk: axes by their instants, traces by the number of their axis (from 1), name, unit and values."""
+    row = lambda values: np.asarray(values, float)[None]
+    x = [{"Name": "Time", "Type": "time", "Data": row(one), "Unit": "s"} for one in axes]
+    y = [
+        {"Name": name, "Type": "value", "Data": row(values), "Unit": unit, "XIndex": np.array([[float(axis)]])}
+        for axis, name, unit, values in traces
+    ]
+    return {
+        "exp1": {
+            "X": x if len(x) > 1 else x[0],
+            "Y": y if len(y) > 1 else y[0],
+            "Description": "d",
+            "Capture": {"Length": 1.0},
+        }
+    }
+
+
+@pytest.mark.parametrize("write", [write_old, write_new])
+@pytest.mark.parametrize("several", [False, True])
+def test_a_capture_of_control_desk(tmp_path, write, several):
+    path, deep = tmp_path / "exp1.mat", "Model Root/esp/yaw_rate/Out1"
+    traces = [
+        (1, f'"{deep}"', "deg/s", 2 * T),
+        (1, "a_y", "m/s^2", 3 * T),
+        *([(2, "v_x", "km/h", 36 + SLOW)] if several else []),
+    ]
+    write(path, recorded([T, SLOW] if several else [T], traces))
+    found = io.read_recording(path)
+    assert set(found.names) == {deep, "a_y", *(["v_x"] if several else [])}
+    np.testing.assert_array_equal(found.time, T)
+    np.testing.assert_allclose(found[deep], 2 * T)
+    np.testing.assert_allclose(found["a_y"], 3 * T)
+    if several:
+        np.testing.assert_allclose(found["v_x"][::2], (36 + SLOW) / 3.6)
+        assert np.isnan(found["v_x"][1::2]).all()
+    mapped = io.read_recording(path, io.ChannelMap({"yaw_rate": io.Channel(deep, sign=-1)}))
+    np.testing.assert_allclose(mapped["yaw_rate"], -np.radians(2 * T))
+
+
+def test_a_single_trace_of_control_desk(tmp_path):
+    write_old(tmp_path / "exp1.mat", recorded([T], [(1, "a_y", "m/s^2", 3 * T)]))
+    np.testing.assert_allclose(io.read_recording(tmp_path / "exp1.mat")["a_y"], 3 * T)
+    write_old(tmp_path / "exp1.mat", recorded([T, SLOW], [(3, "a_y", "m/s^2", 3 * T)]))
+    with pytest.raises(InputError, match="no vector belongs to a time vector"):
+        io.read_recording(tmp_path / "exp1.mat")
