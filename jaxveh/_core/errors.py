@@ -260,7 +260,18 @@ def float_array(value) -> Any:
         value = np.float64(value) if abs(value) < 10**300 else np.float64(np.inf)
     if eqx.is_array_like(value) and not _is_no_number(value):
         return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float))
-    return value
+    return _of_list(value) if isinstance(value, list) else value
+
+
+def _of_list(values: list) -> Any:
+    """A list of real numbers as an array, also of traced ones; others, which are no table of numbers, as they are."""
+    leaves = jax.tree.leaves(values)
+    if not leaves or not all(isinstance(one, int | float | np.generic | np.ndarray | jax.Array) for one in leaves):
+        return values
+    try:
+        return float_array(jax.numpy.asarray(values, dtype=jax.dtypes.canonicalize_dtype(float)))
+    except (TypeError, ValueError, OverflowError):
+        return values
 
 
 def check_numbers(name: str, value) -> None:

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import check, check_at_least, check_known, check_positive
+from jaxveh._core.errors import check, check_at_least, check_known, check_positive, float_array
 from jaxveh._core.parameter import parameter
 from jaxveh.manoeuvres.base import AbstractManoeuvre, PedalInputs, as_time, check_drive
 from jaxveh.numerics import smooth_ramp, smooth_step
@@ -80,7 +80,7 @@ def braking_in_a_turn(
     return Braking(
         ramp=float(ramp), start=float(start), brake_at=float(brake_at), brake_ramp=float(brake_ramp),
         duration=float(duration), speed=speed, steer=steer, deceleration=deceleration,
-        brake_torque=mass * wheel_radius * deceleration, drive_torque=drive_torque,
+        brake_torque=float_array(mass) * float_array(wheel_radius) * float_array(deceleration), drive_torque=drive_torque,
     )  # fmt: skip
 
 

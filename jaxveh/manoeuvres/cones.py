@@ -189,6 +189,7 @@ def clearance(x: Any, y: Any, yaw: Any, width: Any, length: Any, course: Course,
     check_single(width=width, length=length, centre=centre)
     check_positive("width", width, "m")
     check_positive("length", length, "m")
+    check_finite("centre", centre)
     x, y, yaw = (real_array(name, values) for name, values in (("x", x), ("y", y), ("yaw", yaw)))
     if not x.shape == y.shape == yaw.shape or not x.size:
         raise InputError(

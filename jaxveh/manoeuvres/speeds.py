@@ -10,7 +10,15 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.contracts import Checked, contract
-from jaxveh._core.errors import check, check_at_least, check_known, check_positive, check_single, check_whole
+from jaxveh._core.errors import (
+    check,
+    check_at_least,
+    check_finite,
+    check_known,
+    check_positive,
+    check_single,
+    check_whole,
+)
 from jaxveh._core.own_results import number
 from jaxveh._core.parameter import check_parameters, parameter
 from jaxveh.manoeuvres.base import as_time, check_speed
@@ -69,6 +77,7 @@ class ChangingSpeed(AbstractSpeed):
         check_speed("before", self.before)
         check_speed("after", self.after)
         check_known(start=self.start, time=self.time, edge=self.edge)
+        check_finite("start", self.start)
         check_positive("time", self.time, "s")
         check_positive("edge", self.edge, "s")
         check("edge", self.edge, lambda v: v <= self.time, f"at most time = {self.time:g} s")

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import DTypeLike
 
-from jaxveh._core.errors import check_key
+from jaxveh._core.errors import InputError, check_key
 from jaxveh.numerics.elementary import arctan, cos, tan
 from jaxveh.numerics.random import uniform
 
@@ -45,8 +45,13 @@ def gauss_markov_harmonics(
 def sum_of_harmonics(x: Array, frequencies: Array, phases: Array) -> Array:
     """`sqrt(2 / n) sum cos(2 pi f x + phase)` over n harmonics: variance 1, in the shape of x.
 
-    `frequencies` and `phases` are (n,).
+    `frequencies` and `phases` are (n,). **Raises** `InputError` for others.
     """
+    shapes = jnp.shape(frequencies), jnp.shape(phases)
+    if len(shapes[0]) != 1 or shapes[0] != shapes[1] or 0 in shapes[0]:
+        raise InputError(
+            f"frequencies, phases have shapes {shapes[0]}, {shapes[1]}: must be (n,), a pair for each harmonic."
+        )
     angles = (2.0 * math.pi) * (x[..., None] * frequencies) + phases
     return math.sqrt(2.0 / frequencies.shape[-1]) * jnp.sum(cos(angles), axis=-1)
 

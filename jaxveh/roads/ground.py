@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_finite, check_kind, real_array, word_for
@@ -49,10 +50,15 @@ def under(road: AbstractRoad, x: Any, y: Any, yaw: Any, wheels: Sequence[tuple[A
         tan(grade_car) =  tan(grade) cos(yaw) + tan(bank) sin(yaw)
         tan(bank_car)  = -tan(grade) sin(yaw) + tan(bank) cos(yaw)
 
-    Elementwise in x, y and yaw. **Raises** `InputError` unless there are a road, four wheels, and numbers.
+    Elementwise in x, y and yaw. **Raises** `InputError` unless there are a road, four wheels, and numbers of
+    shapes that go together.
     """
     check_kind("road", road, AbstractRoad, "Such as roads.Level().")
     x, y, yaw = (real_array(name, value) for name, value in (("x", x), ("y", y), ("yaw", yaw)))
+    try:
+        np.broadcast_shapes(x.shape, y.shape, yaw.shape)
+    except ValueError:
+        raise InputError(f"x, y, yaw have shapes {x.shape}, {y.shape}, {yaw.shape}: must go together.") from None
     cosine, sine = numerics.cos(yaw), numerics.sin(yaw)
     stands = [
         road.at(x + forward * cosine - left * sine, y + forward * sine + left * cosine)

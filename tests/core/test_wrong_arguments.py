@@ -8,9 +8,9 @@ import inspect
 import jax
 import numpy as np
 import pytest
-from families import arguments_of, refuses
+from families import arguments_of, arrays_among, refuses
 
-from jaxveh import Recording, io, manoeuvres, roads, sensors, statespace, vehicles
+from jaxveh import InputError, Recording, io, manoeuvres, roads, sensors, statespace, vehicles
 
 KEY = jax.random.key(0)
 T = np.arange(5.0)
@@ -97,3 +97,25 @@ def test_what_is_wrong_for_an_argument_is_named(name, made):
     made(**given)
     for argument in arguments_of(made):
         refuses(made, given, argument, SAID.get(argument.name, ""), TAKEN.get((name, argument.name), ()))
+
+
+ENDLESS = {("band", "longest"): "waves from the length zero of wavenumbers on"}
+"""Numbers that may be infinite."""
+
+
+@pytest.mark.parametrize(("name", "made"), CASES)
+def test_no_number_is_nan_or_infinite(name, made):
+    given = right(name, made)
+    for argument, value in arrays_among(made, given).items():
+        for wrong in (np.nan, np.inf, -np.inf):
+            if value.ndim == 0 and not (wrong == np.inf and (name, argument) in ENDLESS):
+                with pytest.raises(InputError):
+                    made(**given | {argument: wrong})
+
+
+def test_shapes_that_do_not_go_together_are_named():
+    with pytest.raises(InputError, match=r"x, y, yaw have shapes \(5,\), \(2,\), \(\): must go together"):
+        roads.under(LEVEL, T, T[:2], 0.1, RIGHT["wheels"])
+    for frequencies, phases in ((T, T[:2]), (0.5, 0.5), (T[:0], T[:0]), (T[None], T[None])):
+        with pytest.raises(InputError, match=r"frequencies, phases have shapes .*: must be \(n,\)"):
+            manoeuvres.WaveringSpeed(20.0, 1.0, frequencies, phases).v_x(1.0)
