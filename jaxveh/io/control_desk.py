@@ -16,8 +16,9 @@ def traces_of(node: Mapping[str, Any]) -> list[tuple[int, Mapping[str, Any], int
     found = []
     for number, trace in enumerate(traces):
         told = trace.get("XIndex")
-        several = len(axes) > 1 and isinstance(told, np.ndarray) and told.size == 1
-        index = int(told.ravel()[0]) - 1 if several else 0
+        index = 0
+        if len(axes) > 1 and isinstance(told, np.ndarray) and told.size == 1:
+            index = int(told.ravel()[0]) - 1
         if not 0 <= index < len(axes):
             return None
         found.append((index, axes[index], number, trace))
