@@ -116,20 +116,28 @@ def _smoothed_with_members(filter: AbstractFilter, model: StateSpace, members: M
     put_first = lambda one, many: jnp.concatenate([jnp.asarray(one, many.dtype)[None], many])
     (single, rest), several = eqx.partition(model, eqx.is_array), eqx.filter(members.models, eqx.is_array)
     every = eqx.combine(jax.tree.map(put_first, single, several), rest)
-    smooth = lambda one: filters.rauch_tung_striebel(filter, one, rows)
-    found = eqx.filter_vmap(smooth, in_axes=(eqx.if_array(0),))(every)
-    centre, others = (jax.tree.map(lambda leaf, at=at: leaf[at], found) for at in (0, slice(1, None)))
-    return dataclasses.replace(centre, std=members.about(centre.mean, others.mean, others.std))
+    part = lambda at, tree: jax.tree.map(lambda leaf: leaf[at], tree)
+
+    def joined(moments):
+        centre, others = part(0, moments[0]), part(slice(1, None), moments)
+        return centre, members.about(centre, *others)
+
+    return filters.smooth_together(filter, every, rows, joined)
 
 
 @eqx.filter_jit
 def _std_of_members(filter: AbstractFilter, members: Members, rows: Row, centre: Any) -> Any:
     """The standard deviations about the means `centre` of a filter."""
+    moments = eqx.filter_vmap(lambda model, belief: belief.moments(model))
+    about = lambda beliefs, centre: members.about(centre, *moments(members.models, beliefs))
 
-    # Identical to a live loop to the last bit: a batch that is written out in scalars rounds differently.
-    def one(model):
-        shown, steps = ("mean", "std"), kit.Steps.whole
-        found, _ = kit.scan_in_form(filter, model, rows, None, lambda belief: None, shown, steps)
-        return found.mean, found.std
+    # Identical to a live loop to the last bit, for its steps are the same; nothing of a member is kept.
+    def body(beliefs, given):
+        row, centre = given
+        beliefs = eqx.filter_vmap(lambda model, belief: filter.step(model, belief, row)[0])(members.models, beliefs)
+        return beliefs, about(beliefs, centre)
 
-    return members.about(centre, *eqx.filter_vmap(one, in_axes=(eqx.if_array(0),))(members.models))
+    first, rest = (jax.tree.map(lambda leaf, at=at: leaf[at], (rows, centre)) for at in (0, slice(1, None)))
+    beliefs = eqx.filter_vmap(lambda model: filter.init(model, first[0], None)[0])(members.models)
+    _, stds = kit.scan_by(kit.Steps.whole, body, beliefs, rest)
+    return jax.tree.map(lambda one, more: jnp.concatenate([one[None], more]), about(beliefs, first[1]), stds)

@@ -30,7 +30,7 @@ from jaxveh.filters.particle import (
     replace_lost,
     without,
 )
-from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
+from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel, smooth_together
 from jaxveh.filters.wrappers.base import (
     AbstractLearnedNoise,
     AbstractRemembering,
@@ -132,6 +132,7 @@ __all__ = [
     "rauch_tung_striebel",
     "replace_lost",
     "row_values",
+    "smooth_together",
     "smoothing_of",
     "variances_of",
     "who_lacks",

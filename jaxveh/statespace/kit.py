@@ -19,11 +19,13 @@ from jaxveh.statespace.driver import (
     SHOWN,
     Steps,
     any_run_misses,
+    estimate_of,
     in_form_for_batches,
     raise_failure,
     scan_and_keep,
     scan_by,
     scan_in_form,
+    shown_of,
 )
 from jaxveh.statespace.independent import whiten
 from jaxveh.statespace.measurements import by_channel, input_result, likelihood_result, presence, result_of_parts
@@ -50,6 +52,7 @@ __all__ = [
     "check_smooths",
     "check_told",
     "draw_rows",
+    "estimate_of",
     "gradients_of",
     "in_both_modes",
     "in_form_for_batches",
@@ -66,6 +69,7 @@ __all__ = [
     "scan_by",
     "scan_in_form",
     "schedule_rows",
+    "shown_of",
     "smoothing_of",
     "whiten",
     "who_lacks",

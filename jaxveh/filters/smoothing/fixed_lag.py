@@ -12,7 +12,7 @@ from jaxveh._core.errors import check_whole
 from jaxveh.filters.choosing import check_ancestors
 from jaxveh.filters.outer_belief import AbstractOuterBelief
 from jaxveh.filters.particle import ParticleBelief
-from jaxveh.filters.smoothing.rauch_tung_striebel import given_later
+from jaxveh.filters.smoothing.given_later import given_later
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.filters.wrappers.base import gaussian_of
 from jaxveh.statespace import AbstractFilter, AbstractWrapper, Gradient, Row, Smoothing, StateSpace, kit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
@@ -10,8 +11,8 @@ import jax
 from jaxveh import numerics
 from jaxveh.filters.gaussian import AbstractGaussianFilter
 from jaxveh.filters.gaussian.belief import GaussianBelief
-from jaxveh.filters.gaussian.filter import transition_image, with_spread
-from jaxveh.filters.gaussian.forms import Later, Spread
+from jaxveh.filters.smoothing.given_later import given_later
+from jaxveh.filters.smoothing.pieces import ALONE, PIECE, Runs, smooth_in_pieces
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
 from jaxveh.filters.wrappers.base import gaussian_of
 from jaxveh.statespace import Row, StateSpace, kit
@@ -19,8 +20,29 @@ from jaxveh.statespace import Row, StateSpace, kit
 
 @eqx.filter_jit
 def rauch_tung_striebel(filter: AbstractGaussianFilter, model: StateSpace, rows: Row) -> SmoothedEstimate:
-    """The smoother of a Gaussian filter's kind over rows with (T,) leaves (Sarkka 2013, eqs 8.6, 9.17 and 10.1)."""
+    """The smoother of a Gaussian filter's kind over rows with (T,) leaves (Sarkka 2013, eqs 8.6, 9.17 and 10.1).
+
+    More than `PIECE` rows are smoothed in pieces, which takes less memory and gives the same numbers except for rounding.
+    """
+    if len(rows.t) > PIECE:
+        return smooth_in_pieces(filter, model, rows, ALONE)
     return kit.in_form_for_batches(_smoothed_in_form, filter, model, rows)
+
+
+@eqx.filter_jit
+def smooth_together(
+    filter: AbstractGaussianFilter, models: StateSpace, rows: Row, joined: Callable[[Any], Any]
+) -> SmoothedEstimate:
+    """The estimate of the first of several `models` on a leading axis (M,), whose rows are all smoothed in one batch.
+
+    Its mean and standard deviation are `joined((means, stds))`: of the report of every model, fields of (M, ...), to fields of
+    (...). A long log is smoothed in pieces, so that `joined` sees a piece at a time, and no more than the result is kept.
+    """
+    first = lambda tree: jax.tree.map(lambda leaf: leaf[0] if eqx.is_array(leaf) else leaf, tree)
+    if len(rows.t) > PIECE:
+        return smooth_in_pieces(filter, models, rows, Runs(eqx.filter_vmap, first, joined))
+    found = eqx.filter_vmap(lambda model: rauch_tung_striebel(filter, model, rows))(models)
+    return smoothed_estimate(first(models), first(found.filtered), joined((found.mean, found.std)))
 
 
 def _smoothed_in_form(
@@ -44,19 +66,3 @@ def _smoothed_in_form(
 
     _, moments = kit.scan_by(steps, back, gaussian_of(last), (before, after), reverse=True)
     return smoothed_estimate(model, filtered, with_last(moments, last.moments(model)))
-
-
-def given_later(
-    filter: AbstractGaussianFilter, model: StateSpace, belief: Any, t: Any, u: Any, later: GaussianBelief
-) -> GaussianBelief:
-    """The Gaussian of a belief, given the smoothed Gaussian `later` at the next row's time `t` with the inputs `u`.
-
-    For a wrapped filter, the process noise is the one that it had estimated at that row.
-    """
-    own, gaussian = filter.adapted_model(model, belief), gaussian_of(belief)
-    image = transition_image(own, gaussian, t, u)
-    law = None if own.process_noise is None else own.process_noise.over(t - gaussian.t)
-    known = Later(later.vector - image.mean, Spread(later.factor, later.matrix))
-    before = Spread(gaussian.factor, gaussian.matrix)
-    found = kit.innermost(filter).form.smooth(image, law, model.states, before, known)
-    return with_spread(gaussian, gaussian.vector + found.shift, found.spread)

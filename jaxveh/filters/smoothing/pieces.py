@@ -1,0 +1,128 @@
+"""The Rauch-Tung-Striebel smoother of a long log, in pieces: only the beliefs of one piece are in memory at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh.filters.smoothing.given_later import given_later
+from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
+from jaxveh.filters.wrappers.base import gaussian_of
+from jaxveh.statespace import Row, StateSpace, kit
+
+PIECE = 20_000
+"""The largest number of rows of a piece. Over a longer log the filter runs twice: through all rows, and through each piece
+again before its way back."""
+
+
+class Runs(NamedTuple):
+    """One run, or several of which the first is the estimate. `over(function)`: a function of a run's values as one of all runs;
+    `first`: the values of the first; `joined`: mean and standard deviation from those of all runs."""
+
+    over: Callable
+    first: Callable
+    joined: Callable
+
+
+ALONE = Runs(lambda function: function, lambda values: values, lambda moments: moments)
+
+
+class Piece(NamedTuple):
+    """The rows of a piece, and where they are `there`: the last piece is filled up."""
+
+    rows: Row
+    there: Any
+
+
+def smooth_in_pieces(filter: Any, model: StateSpace, rows: Row, runs: Runs) -> SmoothedEstimate:
+    """The smoother of the `runs`, whose `model` may have an axis for them, over rows with (T,) leaves, T >= 2."""
+    before, pieces = jax.tree.map(lambda leaf: leaf[0], rows), _cut(rows)
+
+    def begin(model):
+        belief, info = filter.init(model, before, None)
+        return belief, kit.shown_of(model, belief, info, kit.SHOWN)
+
+    def ahead(belief, piece):
+        go_on = lambda model, belief: kit.in_form_for_batches(_ahead, filter, model, *piece, belief)
+        return runs.over(go_on)(model, belief), belief
+
+    def back(later, given):
+        piece, belief = given
+        go_back = lambda model, *values: kit.in_form_for_batches(_back, filter, model, *piece, *values)
+        later, shown, moments = runs.over(go_back)(model, belief, later)
+        return later, (runs.first(shown), runs.joined(moments))
+
+    # Of a piece only its first belief is kept for a gradient, too.
+    scan = lambda body, *values, **how: jax.lax.scan(jax.checkpoint(body, prevent_cse=False), *values, **how)
+    start, shown = runs.over(begin)(model)
+    last, starts = scan(ahead, start, pieces)
+    at_end = runs.over(lambda model, belief: belief.moments(model))(model, last)
+    _, found = scan(back, gaussian_of(last), (pieces, starts), reverse=True)
+    more, moments = jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:])[: len(rows.t) - 1], found)
+    shown = jax.tree.map(lambda one, rest: jnp.concatenate([one[None], rest]), runs.first(shown), more)
+    one = runs.first(model)
+    filtered = kit.estimate_of(one, rows.t, shown, runs.first(last))
+    return smoothed_estimate(one, filtered, with_last(moments, runs.joined(at_end)))
+
+
+def _cut(rows: Row) -> Piece:
+    """All rows but the first in pieces of one length: leaves (pieces, length, ...)."""
+    count = len(rows.t) - 1
+    pieces = -(-count // PIECE)
+    length = -(-count // pieces)
+    fill = pieces * length - count
+
+    def cut(leaf):
+        leaf = leaf[1:]
+        return jnp.concatenate([leaf, jnp.repeat(leaf[-1:], fill, axis=0)]).reshape(pieces, length, *leaf.shape[1:])
+
+    there = jnp.arange(pieces * length).reshape(pieces, length) < count
+    many = jax.tree.map(cut, rows)
+    # A step of no length may have no slope.
+    return Piece(many._replace(t=jnp.where(there, many.t, 2 * rows.t[-1] - rows.t[-2])), there)
+
+
+def _ahead(filter: Any, model: StateSpace, rows: Row, there: Any, belief: Any, steps: kit.Steps) -> Any:
+    """The belief after a piece, from the `belief` before it."""
+
+    def body(belief, given):
+        row, here = given
+        return _where(here, _next(filter, steps)(model, belief, row)[0], belief), None
+
+    return kit.scan_by(steps, body, belief, (rows, there))[0]
+
+
+def _back(
+    filter: Any, model: StateSpace, rows: Row, there: Any, belief: Any, later: Any, steps: kit.Steps
+) -> tuple[Any, Any, Any]:
+    """The smoothed Gaussian before a piece, from the `belief` before it and the smoothed Gaussian `later` of its last row; the
+    filter's rows of the piece; and the smoothed moments of the row before each of them."""
+    in_scalars = steps in (kit.Steps.written_out, kit.Steps.complete)
+    kept = numerics.as_entries if in_scalars else lambda belief: belief
+    whole = lambda kept: numerics.from_entries(kept, belief) if in_scalars else kept
+
+    def ahead(belief, given):
+        row, here = given
+        after, info = _next(filter, steps)(model, belief, row)
+        return _where(here, after, belief), (kept(belief), kit.shown_of(model, after, info, kit.SHOWN))
+
+    def back(later, given):
+        belief, t, u, here = given
+        found = _where(here, given_later(filter, model, whole(belief), t, u, later), later)
+        return found, found.moments(model)
+
+    _, (before, shown) = kit.scan_by(steps, ahead, belief, (rows, there))
+    later, moments = kit.scan_by(steps, back, later, (before, rows.t, rows.u, there), reverse=True)
+    return later, shown, moments
+
+
+def _next(filter: Any, steps: kit.Steps) -> Callable:
+    return filter.step if steps is kit.Steps.whole else filter._next
+
+
+def _where(here: Any, one: Any, other: Any) -> Any:
+    return jax.tree.map(lambda one, other: jnp.where(here, one, other), one, other)
