@@ -80,21 +80,43 @@ def smooth_rows(method: AbstractSmoothable, time: Any, values: dict[str, Any]) -
     take = lambda rows: jax.tree.map(lambda leaf: leaf[rows], (time, values))
     start, rest = take(0), take(slice(1, None))
     first, _ = apart(method.first, start[0], *start)
+    turn = lambda memory: memory.belief
+    if numerics.pieces_of(len(rest[0])) == 1:
+        all_rows = numerics.Piece(*rest, jnp.ones(len(rest[0]), bool))
+        last, memories = _forward(method, first, all_rows)
+        _, said = _backward(method, turn(last), memories, all_rows)
+    else:
+        ahead = lambda memory, piece: _forward(method, memory, piece)[0]
+        back = lambda later, memory, piece: _backward(method, later, _forward(method, memory, piece)[1], piece)
+        last, said = numerics.there_and_back(ahead, back, first, turn, *rest)
+    return jax.tree.map(lambda a, b: jnp.concatenate([a, jnp.asarray(b)[None]]), said, method.say(last))
 
-    def forward(memory, row):
-        memory, _ = apart(method.next, row[0], memory, *row)
-        return memory, memory
 
-    def back(later, step):
-        memory, row = step
-        belief = apart(_given_later, row[0], method, memory, *row, later)
-        return belief, memory._replace(belief=belief)
+def _forward(method: AbstractSmoothable, memory: Any, piece: numerics.Piece) -> tuple[Any, Any]:
+    """The memory after a piece, and those before each of its rows."""
 
-    last, memories = jax.lax.scan(jax.checkpoint(forward), first, rest)
-    before = jax.tree.map(lambda one, more: jnp.concatenate([jnp.asarray(one)[None], more])[:-1], first, memories)
-    _, smoothed = jax.lax.scan(jax.checkpoint(back), last.belief, (before, rest), reverse=True)
-    said, end = jax.vmap(method.say)(smoothed), method.say(last)
-    return jax.tree.map(lambda a, b: jnp.concatenate([a, jnp.asarray(b)[None]]), said, end)
+    def forward(memory, given):
+        t, values, here = given
+        after, _ = apart(method.next, t, memory, t, values)
+        return _where(here, after, memory), memory
+
+    return jax.lax.scan(jax.checkpoint(forward), memory, tuple(piece))
+
+
+def _backward(method: AbstractSmoothable, later: Belief, memories: Any, piece: numerics.Piece) -> tuple[Belief, Answer]:
+    """The smoothed belief before a piece, given that of its last row, `later`; and the answers to the row before each of its
+    rows, from the `memories` there."""
+
+    def back(later, given):
+        memory, (t, values, here) = given
+        belief = _where(here, apart(_given_later, t, method, memory, t, values, later), later)
+        return belief, method.say(memory._replace(belief=belief))
+
+    return jax.lax.scan(jax.checkpoint(back), later, (memories, tuple(piece)), reverse=True)
+
+
+def _where(here: Any, one: Any, other: Any) -> Any:
+    return jax.tree.map(lambda one, other: jnp.where(here, one, other), one, other)
 
 
 def _given_later(method: AbstractSmoothable, memory: Any, t: Any, values: dict[str, Any], later: Belief) -> Belief:

@@ -21,6 +21,7 @@ from jaxveh.numerics.linear_algebra import (
     solve_psd,
     symmetric,
 )
+from jaxveh.numerics.pieces import Piece, pieces_of, there_and_back
 from jaxveh.numerics.platform import barriers_hold, on_cpu, pays_alone
 from jaxveh.numerics.random import cauchy, exponential, normal, normals, student_t, uniform
 from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
@@ -37,6 +38,7 @@ from jaxveh.numerics.written_out import as_entries, as_whole, from_entries, scan
 
 __all__ = [
     "RUNS",
+    "Piece",
     "apart",
     "arctan",
     "arctan2",
@@ -72,6 +74,7 @@ __all__ = [
     "on_cpu",
     "or_one",
     "pays_alone",
+    "pieces_of",
     "polynomials",
     "residual",
     "scan_batch_last",
@@ -95,6 +98,7 @@ __all__ = [
     "symmetric",
     "systematic",
     "tan",
+    "there_and_back",
     "total",
     "uniform",
     "wrap_angle",

@@ -1,4 +1,6 @@
-"""The Rauch-Tung-Striebel smoother of a long log, in pieces: only the beliefs of one piece are in memory at a time."""
+"""The Rauch-Tung-Striebel smoother of a long log, in pieces: only the beliefs of one piece are in memory at a time.
+
+The filter runs twice, through all rows, and through each piece again before its way back."""
 
 from __future__ import annotations
 
@@ -14,10 +16,6 @@ from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimat
 from jaxveh.filters.wrappers.base import gaussian_of
 from jaxveh.statespace import Row, StateSpace, kit
 
-PIECE = 20_000
-"""The largest number of rows of a piece. Over a longer log the filter runs twice: through all rows, and through each piece
-again before its way back."""
-
 
 class Runs(NamedTuple):
     """One run, or several of which the first is the estimate. `over(function)`: a function of a run's values as one of all runs;
@@ -31,59 +29,30 @@ class Runs(NamedTuple):
 ALONE = Runs(lambda function: function, lambda values: values, lambda moments: moments)
 
 
-class Piece(NamedTuple):
-    """The rows of a piece, and where they are `there`: the last piece is filled up."""
-
-    rows: Row
-    there: Any
-
-
 def smooth_in_pieces(filter: Any, model: StateSpace, rows: Row, runs: Runs) -> SmoothedEstimate:
     """The smoother of the `runs`, whose `model` may have an axis for them, over rows with (T,) leaves, T >= 2."""
-    before, pieces = jax.tree.map(lambda leaf: leaf[0], rows), _cut(rows)
+    before, after = jax.tree.map(lambda leaf: leaf[0], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
 
     def begin(model):
         belief, info = filter.init(model, before, None)
         return belief, kit.shown_of(model, belief, info, kit.SHOWN)
 
-    def ahead(belief, piece):
-        go_on = lambda model, belief: kit.in_form_for_batches(_ahead, filter, model, *piece, belief)
-        return runs.over(go_on)(model, belief), belief
+    def in_form(form, piece):
+        some = piece.rows._replace(t=piece.time), piece.there
+        return lambda model, *values: kit.in_form_for_batches(form, filter, model, *some, *values)
 
-    def back(later, given):
-        piece, belief = given
-        go_back = lambda model, *values: kit.in_form_for_batches(_back, filter, model, *piece, *values)
-        later, shown, moments = runs.over(go_back)(model, belief, later)
+    def back(later, belief, piece):
+        later, shown, moments = runs.over(in_form(_back, piece))(model, belief, later)
         return later, (runs.first(shown), runs.joined(moments))
 
-    # Of a piece only its first belief is kept for a gradient, too.
-    scan = lambda body, *values, **how: jax.lax.scan(jax.checkpoint(body, prevent_cse=False), *values, **how)
+    ahead = lambda belief, piece: runs.over(in_form(_ahead, piece))(model, belief)
     start, shown = runs.over(begin)(model)
-    last, starts = scan(ahead, start, pieces)
+    last, (more, moments) = numerics.there_and_back(ahead, back, start, gaussian_of, after.t, after)
     at_end = runs.over(lambda model, belief: belief.moments(model))(model, last)
-    _, found = scan(back, gaussian_of(last), (pieces, starts), reverse=True)
-    more, moments = jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:])[: len(rows.t) - 1], found)
     shown = jax.tree.map(lambda one, rest: jnp.concatenate([one[None], rest]), runs.first(shown), more)
     one = runs.first(model)
     filtered = kit.estimate_of(one, rows.t, shown, runs.first(last))
     return smoothed_estimate(one, filtered, with_last(moments, runs.joined(at_end)))
-
-
-def _cut(rows: Row) -> Piece:
-    """All rows but the first in pieces of one length: leaves (pieces, length, ...)."""
-    count = len(rows.t) - 1
-    pieces = -(-count // PIECE)
-    length = -(-count // pieces)
-    fill = pieces * length - count
-
-    def cut(leaf):
-        leaf = leaf[1:]
-        return jnp.concatenate([leaf, jnp.repeat(leaf[-1:], fill, axis=0)]).reshape(pieces, length, *leaf.shape[1:])
-
-    there = jnp.arange(pieces * length).reshape(pieces, length) < count
-    many = jax.tree.map(cut, rows)
-    # A step of no length may have no slope.
-    return Piece(many._replace(t=jnp.where(there, many.t, 2 * rows.t[-1] - rows.t[-2])), there)
 
 
 def _ahead(filter: Any, model: StateSpace, rows: Row, there: Any, belief: Any, steps: kit.Steps) -> Any:
@@ -91,7 +60,7 @@ def _ahead(filter: Any, model: StateSpace, rows: Row, there: Any, belief: Any, s
 
     def body(belief, given):
         row, here = given
-        return _where(here, _next(filter, steps)(model, belief, row)[0], belief), None
+        return _where(here, _next(filter, model, belief, row, steps)[0], belief), None
 
     return kit.scan_by(steps, body, belief, (rows, there))[0]
 
@@ -107,7 +76,7 @@ def _back(
 
     def ahead(belief, given):
         row, here = given
-        after, info = _next(filter, steps)(model, belief, row)
+        after, info = _next(filter, model, belief, row, steps)
         return _where(here, after, belief), (kept(belief), kit.shown_of(model, after, info, kit.SHOWN))
 
     def back(later, given):
@@ -120,8 +89,9 @@ def _back(
     return later, shown, moments
 
 
-def _next(filter: Any, steps: kit.Steps) -> Callable:
-    return filter.step if steps is kit.Steps.whole else filter._next
+def _next(filter: Any, model: StateSpace, belief: Any, row: Row, steps: kit.Steps) -> tuple[Any, Any]:
+    told = model, belief, row
+    return numerics.apart(filter._next, belief.count, *told) if steps is kit.Steps.whole else filter._next(*told)
 
 
 def _where(here: Any, one: Any, other: Any) -> Any:

@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh.filters.gaussian import AbstractGaussianFilter
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.smoothing.given_later import given_later
-from jaxveh.filters.smoothing.pieces import ALONE, PIECE, Runs, smooth_in_pieces
+from jaxveh.filters.smoothing.pieces import ALONE, Runs, smooth_in_pieces
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
 from jaxveh.filters.wrappers.base import gaussian_of
 from jaxveh.statespace import Row, StateSpace, kit
@@ -22,9 +22,10 @@ from jaxveh.statespace import Row, StateSpace, kit
 def rauch_tung_striebel(filter: AbstractGaussianFilter, model: StateSpace, rows: Row) -> SmoothedEstimate:
     """The smoother of a Gaussian filter's kind over rows with (T,) leaves (Sarkka 2013, eqs 8.6, 9.17 and 10.1).
 
-    More than `PIECE` rows are smoothed in pieces, which takes less memory and gives the same numbers except for rounding.
+    A long log is smoothed in pieces (`numerics.there_and_back`), which takes less memory and gives the same numbers except for
+    rounding.
     """
-    if len(rows.t) > PIECE:
+    if numerics.pieces_of(len(rows.t) - 1) > 1:
         return smooth_in_pieces(filter, model, rows, ALONE)
     return kit.in_form_for_batches(_smoothed_in_form, filter, model, rows)
 
@@ -39,7 +40,7 @@ def smooth_together(
     (...). A long log is smoothed in pieces, so that `joined` sees a piece at a time, and no more than the result is kept.
     """
     first = lambda tree: jax.tree.map(lambda leaf: leaf[0] if eqx.is_array(leaf) else leaf, tree)
-    if len(rows.t) > PIECE:
+    if numerics.pieces_of(len(rows.t) - 1) > 1:
         return smooth_in_pieces(filter, models, rows, Runs(eqx.filter_vmap, first, joined))
     found = eqx.filter_vmap(lambda model: rauch_tung_striebel(filter, model, rows))(models)
     return smoothed_estimate(first(models), first(found.filtered), joined((found.mean, found.std)))
