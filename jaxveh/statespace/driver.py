@@ -210,20 +210,20 @@ def scan_in_form(
     def body(belief, row):
         told = model, belief, row
         belief, info = numerics.apart(filter._next, belief.count, *told) if whole else filter._next(*told)
-        return belief, (shown_of(model, belief, info, keep), of_belief(belief))
+        return belief, (estimate_of_row(model, belief, info, keep), of_belief(belief))
 
     if complete:
         belief, info = numerics.write_out(lambda row: filter._first(model, row, key), first, complete=True)
     else:
         belief, info = filter.init(model, first, key)
-    start = shown_of(model, belief, info, keep), of_belief(belief)
+    start = estimate_of_row(model, belief, info, keep), of_belief(belief)
 
     belief, rest = scan_by(steps, body, belief, rest)
     shown, kept = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, rest)
     return estimate_of(model, rows.t, shown, belief), kept
 
 
-def shown_of(model: StateSpace, belief: Any, info: Info, keep: tuple[str, ...]) -> tuple[Any, Any, Shown]:
+def estimate_of_row(model: StateSpace, belief: Any, info: Info, keep: tuple[str, ...]) -> tuple[Any, Any, Shown]:
     """The log-likelihood and the result of a row, and what an estimate keeps of it."""
     mean, std = belief.moments(model) if {"mean", "std"} & set(keep) else (None, None)
     of_row = Shown(mean if "mean" in keep else None, std if "std" in keep else None, _kept_of(info, keep))
@@ -231,7 +231,7 @@ def shown_of(model: StateSpace, belief: Any, info: Info, keep: tuple[str, ...]) 
 
 
 def estimate_of(model: StateSpace, time: Any, shown: tuple[Any, Any, Shown], belief: Any) -> Estimate:
-    """The estimate from `shown_of` every row, (T,) leaves, and the `belief` after the last."""
+    """The estimate from `estimate_of_row` every row, (T,) leaves, and the `belief` after the last."""
     log_likelihood, results, (mean, std, info) = shown
     result, failed_at = first_failure(results)
     show = lambda report: None if report is None else parameters_of(model, report)

@@ -20,12 +20,12 @@ from jaxveh.statespace.driver import (
     Steps,
     any_run_misses,
     estimate_of,
+    estimate_of_row,
     in_form_for_batches,
     raise_failure,
     scan_and_keep,
     scan_by,
     scan_in_form,
-    shown_of,
 )
 from jaxveh.statespace.independent import whiten
 from jaxveh.statespace.measurements import by_channel, input_result, likelihood_result, presence, result_of_parts
@@ -53,6 +53,7 @@ __all__ = [
     "check_told",
     "draw_rows",
     "estimate_of",
+    "estimate_of_row",
     "gradients_of",
     "in_both_modes",
     "in_form_for_batches",
@@ -69,7 +70,6 @@ __all__ = [
     "scan_by",
     "scan_in_form",
     "schedule_rows",
-    "shown_of",
     "smoothing_of",
     "whiten",
     "who_lacks",

@@ -35,7 +35,7 @@ def smooth_in_pieces(filter: Any, model: StateSpace, rows: Row, runs: Runs) -> S
 
     def begin(model):
         belief, info = filter.init(model, before, None)
-        return belief, kit.shown_of(model, belief, info, kit.SHOWN)
+        return belief, kit.estimate_of_row(model, belief, info, kit.SHOWN)
 
     def in_form(form, piece):
         some = piece.rows._replace(t=piece.time), piece.there
@@ -77,7 +77,7 @@ def _back(
     def ahead(belief, given):
         row, here = given
         after, info = _next(filter, model, belief, row, steps)
-        return _where(here, after, belief), (kept(belief), kit.shown_of(model, after, info, kit.SHOWN))
+        return _where(here, after, belief), (kept(belief), kit.estimate_of_row(model, after, info, kit.SHOWN))
 
     def back(later, given):
         belief, t, u, here = given
