@@ -16,7 +16,8 @@ from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractSmoothable, answer
-from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
+from jaxveh.estimators.misfit import Misfit, Roughness, learn_roughness, no_misfit, no_roughness
+from jaxveh.estimators.sequential import Belief, Measurement, belief_of, correct_by_each, move, spread_of
 from jaxveh.estimators.steer_agreement import AgreementMemory, SteerAgreement, agreement_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
@@ -52,11 +53,14 @@ MORE = ("v_y", "rear_scale", "roll_scale", "a_y_bias", "yaw_rate_bias", "roll_ra
 
 
 class Memory(NamedTuple):
-    """The last measurements, the belief, and how far the car lately was from a steady turn (None: not checked)."""
+    """The last measurements, the belief, and how far the car lately was from a steady turn (None: not checked); how noisy the
+    log is: the `misfit` of slip angle, course and roll rate, and the `roughness` of a_y and yaw rate."""
 
     motion: Any
     belief: Belief
     agreement: AgreementMemory | None
+    misfit: Misfit
+    roughness: tuple[Roughness, Roughness]
 
 
 class Leaning(AbstractSmoothable):
@@ -123,27 +127,34 @@ class Leaning(AbstractSmoothable):
         }  # fmt: skip
         belief = belief_of(State, {"a_y_bias": self.a_y_offset}, stds, t)
         agreement = None if self.steering is None else self.steering.start(t)
-        memory = Memory(motion, self._measured(belief, heard, agreement), agreement)
+        belief, misfit = self._measured(belief, heard, agreement, no_misfit(3, t))
+        rough = no_roughness(values["a_y"]), no_roughness(values["yaw_rate"])
+        memory = Memory(motion, belief, agreement, misfit, rough)
         return memory, self.say(memory)
 
     def next(self, memory, t, values):
         motion, heard = self.motion.next(memory.motion, t, values)
         agreement = None if self.steering is None else self.steering.next(memory.agreement, values, heard)
-        belief = self._measured(self._ahead(memory.belief, heard), heard, agreement)
-        memory = Memory(motion, belief, agreement)
+        belief = self._ahead(memory.belief, heard, memory.roughness)
+        belief, misfit = self._measured(belief, heard, agreement, memory.misfit)
+        said = zip(memory.roughness, (values["a_y"], values["yaw_rate"]), strict=True)
+        rough = tuple(learn_roughness(one, value, heard["dt"]) for one, value in said)
+        memory = Memory(motion, belief, agreement, misfit, rough)
         return memory, self.say(memory)
 
     def ahead(self, memory, t, values):
-        return self._ahead(memory.belief, self.motion.next(memory.motion, t, values)[1])
+        return self._ahead(memory.belief, self.motion.next(memory.motion, t, values)[1], memory.roughness)
 
-    def _ahead(self, belief: Belief, heard) -> Belief:
+    def _ahead(self, belief: Belief, heard, roughness) -> Belief:
         dt = heard["dt"]
+        force, turn = (one.variance for one in roughness)
         fast = self._passing(heard["v_x"])
         # The law of the bank by distance: a chain of two first-order lags, with this variance.
         slow, quick = fast / self.bank_length, fast / self.bank_edge
         bank_walk = 2.0 * jnp.square(self.bank_spread) * slow * quick * (slow + quick)
         per_second = {
-            "v_y": 4e-5, "yaw": 1e-7, "bank_rate": bank_walk, "body_roll_rate": 2e-3, "a_y_bias": 4e-6, "yaw_rate_bias": 3e-8,
+            "v_y": 4e-5 + dt * (force + jnp.square(heard["v_x"]) * turn), "yaw": 1e-7 + dt * turn,
+            "bank_rate": bank_walk, "body_roll_rate": 2e-3, "a_y_bias": 4e-6, "yaw_rate_bias": 3e-8,
             "roll_rate_bias": 3e-8, "slope_bias": 1e-7, "rear_scale": 1e-5, "roll_scale": 1e-6,
         }  # fmt: skip
         step = lambda x: self._step(x, heard, slow, quick)
@@ -176,7 +187,7 @@ class Leaning(AbstractSmoothable):
             body_roll_rate=rate,
         )
 
-    def _measured(self, belief: Belief, heard, agreement: AgreementMemory | None) -> Belief:
+    def _measured(self, belief: Belief, heard, agreement: AgreementMemory | None, misfit: Misfit):
         v_x, dt = heard["v_x"], heard["dt"]
         fast = away_from_zero(v_x)
 
@@ -206,15 +217,19 @@ class Leaning(AbstractSmoothable):
         forgets = self._passing(v_x) / self.bank_length
         satellites, gyroscope = ~jnp.isnan(heard["course"]), ~jnp.isnan(heard["roll_rate"])
         # A correlated error counts once per correlation time, however many rows there are; in hard turns tyres are not linear.
-        lasting = jnp.square(self.slip_error) * 2.0 * self.slip_error_time / jnp.maximum(dt, 1e-3)
+        repeats = 2.0 * self.slip_error_time / jnp.maximum(dt, 1e-3)
+        lasting = jnp.square(self.slip_error) * repeats
         fourth = lambda x: jnp.square(jnp.square(x))
         slip = lasting * (1.0 + fourth(heard["a_y"] / LINEAR))
         if agreement is not None:
             slip = slip + lasting * fourth(agreement.doubt)
         there = heard["silence"] < SILENCE
-        belief = correct(belief, rear, slip, there, State, self.slip_gate, FALL)
-        belief = correct(belief, course, jnp.square(self.across / fast), satellites & (v_x > 1.0), State, 3.0)
-        return correct(belief, rolling, jnp.square(self.roll_rate_noise), gyroscope, State)
+        measured = (
+            Measurement(rear, slip, there, self.slip_gate, FALL, repeats),
+            Measurement(course, jnp.square(self.across / fast), satellites & (v_x > 1.0), 3.0),
+            Measurement(rolling, jnp.square(self.roll_rate_noise), gyroscope),
+        )
+        return correct_by_each(belief, measured, misfit, dt, State)
 
     def say(self, memory):
         motion, belief = memory.motion, memory.belief

@@ -21,7 +21,8 @@ from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.leaning import SLOWEST
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractSmoothable, Filtered, answer
-from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
+from jaxveh.estimators.misfit import Misfit, Roughness, learn_roughness, no_misfit, no_roughness
+from jaxveh.estimators.sequential import Belief, Measurement, belief_of, correct_by_each, move, spread_of
 from jaxveh.estimators.sliding import Sliding
 from jaxveh.filters import Extended
 from jaxveh.io import CarSpecification
@@ -55,11 +56,14 @@ shows: a force that is 3 % too large in all rows is a mass that is 3 % too large
 
 
 class PullingMemory(NamedTuple):
-    """The last measurements, whether the car slides, and the belief."""
+    """The last measurements, whether the car slides, and the belief; how noisy the log is: the `misfit` of wheels, satellites,
+    climb rate and forces, and the `roughness` of a_x."""
 
     motion: Any
     slides: Any
     belief: Belief
+    misfit: Misfit
+    roughness: Roughness
 
 
 class Pulling(AbstractSmoothable, AbstractDriveForce):
@@ -123,18 +127,22 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
         }  # fmt: skip
         belief = belief_of(State, {"v_x": heard["v_x"], "a_x_bias": self.a_x_offset, "slip": self.slip}, stds, t)
         slides = self.sliding.start(t)
-        memory = PullingMemory(motion, slides, self._measured(belief, slides.doubt, heard, values))
+        belief, misfit = self._measured(belief, slides.doubt, heard | {"rough": 0.0 * t}, values, no_misfit(4, t))
+        memory = PullingMemory(motion, slides, belief, misfit, no_roughness(values["a_x"]))
         return memory, self.say(memory)
 
     def next(self, memory, t, values):
         motion, slides, heard = self._hear(memory, t, values)
-        belief = self._ahead(memory.belief, slides.doubt, heard)
-        memory = PullingMemory(motion, slides, self._measured(belief, slides.doubt, heard, values))
+        belief = self._ahead(memory.belief, slides.doubt, heard, memory.roughness)
+        rough = learn_roughness(memory.roughness, values["a_x"], heard["dt"])
+        heard = heard | {"rough": memory.roughness.variance}
+        belief, misfit = self._measured(belief, slides.doubt, heard, values, memory.misfit)
+        memory = PullingMemory(motion, slides, belief, misfit, rough)
         return memory, self.say(memory)
 
     def ahead(self, memory, t, values):
         _, slides, heard = self._hear(memory, t, values)
-        return self._ahead(memory.belief, slides.doubt, heard)
+        return self._ahead(memory.belief, slides.doubt, heard, memory.roughness)
 
     def _hear(self, memory, t, values):
         """The motion, whether the car slides, and the completed row."""
@@ -146,7 +154,7 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
             heard,
         )
 
-    def _ahead(self, belief: Belief, doubt, heard) -> Belief:
+    def _ahead(self, belief: Belief, doubt, heard, roughness: Roughness) -> Belief:
         dt = heard["dt"]
         fast = jnp.maximum(jnp.abs(State(*belief.mean).v_x), SLOWEST)
         slow, quick = fast / self.grade_length, fast / self.grade_edge
@@ -154,7 +162,8 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
         # While a car slides, its rate of speed has an unknown part.
         slides = 2.0 * self.sliding.gathering * jnp.square(doubt.across * heard["yaw_rate"])
         per_second = {
-            "v_x": 4e-5 + slides, "grade_rate": walk, "a_x_bias": 4e-6, "log_mass": 1e-8, "rolling_bias": 1e-6,
+            "v_x": 4e-5 + dt * roughness.variance + slides,
+            "grade_rate": walk, "a_x_bias": 4e-6, "log_mass": 1e-8, "rolling_bias": 1e-6,
             "wheel_scale": 1e-9,
         }  # fmt: skip
 
@@ -180,7 +189,7 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
         v_y = self._rolls_across(x.v_x, heard)
         return self._felt(x, heard) + v_y * heard["yaw_rate"] - GRAVITY * numerics.sin(x.grade)
 
-    def _measured(self, belief: Belief, slides, heard, values) -> Belief:
+    def _measured(self, belief: Belief, slides, heard, values, misfit: Misfit) -> tuple[Belief, Misfit]:
         v_x, dt = State(*belief.mean).v_x, jnp.maximum(heard["dt"], 1e-3)
         fast = jnp.maximum(jnp.abs(v_x), SLOWEST)
         drive, brake = values["drive_torque"], values["brake_torque"]
@@ -226,13 +235,15 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
             ago = x.v_x - self.wheel_delay * self._speeds_up(x, heard)
             return heard["v_x"] - ago * (1.0 + x.wheel_scale + x.slip * (pushing - slowing))
 
-        belief = correct(belief, wheels, slips, spoke, State, 3.0)
-        belief = correct(
-            belief, satellite, jnp.square(self.satellite_noise) + drifts, satellites & (v_x > 1.0), State, 3.0
-        )
-        belief = correct(belief, climb, jnp.square(self.climb_noise), climbs, State, 3.0)
         there = (heard["pull_silence"] < SILENCE) & (v_x > SLOWEST)
-        return correct(belief, balance, lasting, pushed & there, State, 3.0)
+        by_satellite = jnp.square(self.satellite_noise) + drifts
+        measured = (
+            Measurement(wheels, slips, spoke, 3.0),
+            Measurement(satellite, by_satellite, satellites & (v_x > 1.0), 3.0),
+            Measurement(climb, jnp.square(self.climb_noise), climbs, 3.0),
+            Measurement(balance, lasting + heard["rough"], pushed & there, 3.0),
+        )
+        return correct_by_each(belief, measured, misfit, heard["dt"], State)
 
     def say(self, memory):
         motion, belief = memory.motion, memory.belief

@@ -3,19 +3,20 @@
 The Gaussian filters of `jaxveh.filters` use a `StateSpace`, whose process noise has one law for all rows. A road changes with
 distance and not with time, so here the noise is given with every step. A step is a few products of small matrices.
 
-`predict`, `implicit_step`, `innovation` and `update` work on vectors; `belief_of`, `move`, `correct` and `spread_of` on states
-with named fields.
+`predict`, `implicit_step`, `innovation` and `update` work on vectors; `belief_of`, `move`, `correct`, `correct_by_each` and
+`spread_of` on states with named fields.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh.estimators.misfit import Misfit, learn_misfit
 
 
 class Belief(NamedTuple):
@@ -97,27 +98,51 @@ def move(belief: Belief, step: Callable[[Any], Any], variances: Mapping[str, Any
     return predict(belief, lambda vector: jnp.stack(step(state_type(*vector))), noise)
 
 
-def correct(
-    belief: Belief,
-    error_of: Callable[[Any], Any],
-    variance: Any,
-    here: Any,
-    state_type: Any,
-    gate: Any = None,
-    fall: float = 1.0,
-) -> Belief:
-    """The belief after one measurement with this noise variance, where it is `here`.
+class Measurement(NamedTuple):
+    """One measurement, with independent noise of this `variance`, where it is `here`.
 
     `error_of(state)`: the measurement less its prediction; finite wherever the belief is. `gate`: an error e of more than this
     many of its predicted standard deviations has the weight `(gate / |e|)^fall`, None: all have the same weight. With a
-    `fall` of 1 (Huber) the correction stays the same beyond the gate, with more it falls.
+    `fall` of 1 (Huber) the correction stays the same beyond the gate, with more it falls. `repeats`: an error that lasts for so
+    many rows has a `variance` of so many times its own, so that together they count once.
     """
-    error, slope = jax.value_and_grad(lambda vector: error_of(state_type(*vector)))(belief.mean)
-    found = Innovation(error, slope @ belief.covariance @ slope + variance, -slope)
+
+    error_of: Callable[[Any], Any]
+    variance: Any
+    here: Any
+    gate: Any = None
+    fall: float = 1.0
+    repeats: Any = 1.0
+
+
+def correct(belief: Belief, measurement: Measurement, state_type: Any) -> Belief:
+    """The belief after one measurement."""
+    return _corrected(belief, measurement, measurement.variance, state_type)[0]
+
+
+def correct_by_each(
+    belief: Belief, measurements: Sequence[Measurement], misfit: Misfit, dt: Any, state_type: Any
+) -> tuple[Belief, Misfit]:
+    """The belief after one measurement after another, whose variances are multiplied by what the `misfit` has learnt until this
+    row, `dt` (s) after the last; and the misfit after it."""
+    squares = []
+    for times, one in zip(misfit.times, measurements, strict=True):
+        noise = times * one.variance
+        belief, found = _corrected(belief, one, noise, state_type)
+        # The variance of the innovation itself, of which several may be the same error.
+        own = found.variance - noise * (1.0 - 1.0 / one.repeats)
+        squares.append(jnp.where(one.here, jnp.square(found.residual) / own, jnp.nan))
+    return belief, learn_misfit(misfit, jnp.stack(squares), dt)
+
+
+def _corrected(belief: Belief, one: Measurement, noise: Any, state_type: Any) -> tuple[Belief, Innovation]:
+    """The belief after a measurement with noise of this variance, and the innovation."""
+    error, slope = jax.value_and_grad(lambda vector: one.error_of(state_type(*vector)))(belief.mean)
+    found = Innovation(error, slope @ belief.covariance @ slope + noise, -slope)
     trust = jnp.ones_like(error)
-    if gate is not None:
-        trust = jnp.maximum(jnp.square(error) / (gate * gate * found.variance), 1.0) ** (-0.5 * fall)
-    return update(belief, found, jnp.where(here, trust, 0.0))
+    if one.gate is not None:
+        trust = jnp.maximum(jnp.square(error) / (one.gate * one.gate * found.variance), 1.0) ** (-0.5 * one.fall)
+    return update(belief, found, jnp.where(one.here, trust, 0.0)), found
 
 
 def spread_of(belief: Belief, weights: Mapping[str, Any], state_type: Any) -> Any:

@@ -42,9 +42,9 @@ def motion(t, speed):
     )
 
 
-def channels(speed=15.0, seed=0):
+def channels(speed=15.0, seed=0, rows=ROWS):
     """Every channel by name, (T,), and the truth among them."""
-    rng, t = np.random.default_rng(seed), STEP * np.arange(ROWS)
+    rng, t = np.random.default_rng(seed), STEP * np.arange(rows)
     one = motion(t, speed)
     rate = lambda values: np.gradient(values, t)
     v_x, v_y, yaw_rate = one["v_x"], one["v_y"], one["yaw_rate"]
@@ -58,10 +58,10 @@ def channels(speed=15.0, seed=0):
     wheels = {f"wheel_speed_{at}": v_x + side * yaw_rate for at, side in sides.items()}
     brake, drive = np.maximum(-torque, 0.0), np.maximum(torque, 0.0)
     shares = dict(zip(CORNERS, (0.325, 0.325, 0.175, 0.175), strict=True))
-    fresh = np.arange(ROWS) % 5 == 0
+    fresh = np.arange(rows) % 5 == 0
     satellite = lambda values: np.where(fresh, values, np.nan)
     front = CAR.mass * CAR.rear_axle_to_cg / 2.7 * flat
-    noise = lambda values, std: values + std * rng.normal(size=ROWS)
+    noise = lambda values, std: values + std * rng.normal(size=rows)
     return {
         **one, "time": t, "roll": roll, "pitch": -one["grade"], "yaw": yaw, "sideslip": np.arctan2(v_y, np.abs(v_x)),
         "yaw_rate": noise(yaw_rate, 0.002), "a_x": noise(a_x, 0.05), "a_y": noise(flat + G * np.sin(roll), 0.05),
@@ -79,7 +79,7 @@ def channels(speed=15.0, seed=0):
         **{f"drive_torque_{at}": 0.25 * drive for at in CORNERS},
         **{name: noise(values, 0.02) for name, values in wheels.items()},
         **{f"omega_{at}": wheels[f"wheel_speed_{at}"] / CAR.wheel_radius for at in CORNERS},
-        **{f"load_{at}": np.full(ROWS, CAR.mass * G / 4.0) for at in CORNERS},
+        **{f"load_{at}": np.full(rows, CAR.mass * G / 4.0) for at in CORNERS},
     }  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import pytest
 from banked_drives import follow_all
 
 from jaxveh import InputError, Recording, manoeuvres, roads, sensors, simulate, vehicles
-from jaxveh.estimators import friction
+from jaxveh.estimators import friction, misfit
 from jaxveh.estimators.friction import brush_curve
 from jaxveh.estimators.friction.laws import planar_car
 from jaxveh.tyres import Brush, Contact
@@ -242,7 +242,7 @@ def test_sensors_noisier_than_the_method_expects_make_no_friction_known(times, m
     for learnt, more in zip(np.asarray(memory.misfit.times), times, strict=True):
         assert 0.6 * more**2 < learnt < 1.1 * more**2 if more > 1.0 else learnt == 1.0
     # Without it, the noise is taken for a slippery road.
-    monkeypatch.setattr(friction.bank, "OUTLIER", 1.0)
+    monkeypatch.setattr(misfit, "OUTLIER", 1.0)
     _, said, std, _ = friction_of_noisy_sensors(times)
     assert np.mean(np.square((said - 1.0) / std)[T[1:] > 3.0]) > 10.0
 

@@ -14,6 +14,7 @@ from jaxveh.estimators.friction.along import AlongEvidence
 from jaxveh.estimators.friction.laws import LEAST_FRICTION, PlanarCar
 from jaxveh.estimators.friction.motion import Told, next_told, start_told
 from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.misfit import Misfit, learn_misfit, no_misfit
 from jaxveh.estimators.sequential import implicit_step
 from jaxveh.estimators.two_axles import LATERAL
 from jaxveh.vehicles import GRAVITY
@@ -34,12 +35,6 @@ than this count as one."""
 NEAR = 0.18232
 """ln 1.2: a friction is known if it is probably within this range around the median."""
 
-OUTLIER = 9.0
-"""Largest squared innovation over its predicted variance that counts for the misfit: that of three standard deviations."""
-
-FIRST = 0.5
-"""s: for how long the first misfit counts as learnt."""
-
 
 class Bank(NamedTuple):
     """Logarithms of the weights (K,), each filter's mean (K, 8) and covariance (K, 8, 8)."""
@@ -47,14 +42,6 @@ class Bank(NamedTuple):
     weights: Any
     means: Any
     covariances: Any
-
-
-class Misfit(NamedTuple):
-    """By how much the variances of yaw rate and a_y are larger than the method's, `times` (2,), at least 1; and from how many
-    seconds this was learnt, `seconds` (2,)."""
-
-    times: Any
-    seconds: Any
 
 
 class BankMemory(NamedTuple):
@@ -128,8 +115,9 @@ class FrictionBank(AbstractMethod):
     def first(self, t, values):
         bank = Bank(jnp.log(self._prior()), *self._start())
         along = None if self.along is None else self.along.start(t)
-        misfit = Misfit(jnp.ones((2,), t.dtype), jnp.full((2,), FIRST, t.dtype))
-        return self._said(BankMemory(start_told(t, values), bank, along, jnp.zeros_like(t), misfit), 0.0)
+        return self._said(
+            BankMemory(start_told(t, values), bank, along, jnp.zeros_like(t), no_misfit(2, t, first=1.0)), 0.0
+        )
 
     def next(self, memory, t, values):
         dt = jnp.clip(t - memory.told.t, 0.0, 1.0)
@@ -259,11 +247,9 @@ class FrictionBank(AbstractMethod):
             # One variance for all: where noises are a guess, a less certain prediction is not less likely.
             squares = jnp.square(error) / jnp.sum(before * variance)
             likelihoods = likelihoods - 0.5 * (1.0 - jnp.exp(-dt / time)) * squares
-            ratios.append(jnp.minimum(jnp.sum(before * squares), OUTLIER))
-        seconds = jnp.minimum(misfit.seconds + dt, self.learn_time)
-        times = misfit.times * (1.0 + jnp.minimum(dt / seconds, 1.0) * (jnp.stack(ratios) - 1.0))
-        learnt = Misfit(jnp.maximum(times, 1.0), seconds)
-        learnt = jax.tree.map(lambda new, old: jnp.where(jnp.isnan(measured), old, new), learnt, misfit)
+            ratios.append(jnp.sum(before * squares))
+        ratios = jnp.where(jnp.isnan(measured), jnp.nan, jnp.stack(ratios))
+        learnt = learn_misfit(misfit, ratios, dt, self.learn_time)
         return Bank(bank.weights, means, covariances), likelihoods, learnt
 
     def _carried(self, told: Told, a_y, dt):

@@ -15,7 +15,7 @@ from jaxveh.estimators.body_motion import SILENCE, away_from_zero, hold
 from jaxveh.estimators.car_file import number_of
 from jaxveh.estimators.leaning import Leaning, leaning_filter
 from jaxveh.estimators.method import AbstractMethod, answer
-from jaxveh.estimators.sequential import Belief, belief_of, correct
+from jaxveh.estimators.sequential import Belief, Measurement, belief_of, correct
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -141,7 +141,9 @@ class Learner(AbstractMethod):
         start = self._understeer() * force - self.yaw_inertia * self._place_slope() / self.mass * rate
         off = lambda x: steer - x.offset - (1.0 + x.ratio) * (curve + start + x.understeer * force)
         calm = 1.0 + jnp.square(jnp.square(rate / CALM))
-        steering = correct(memory.steering, off, jnp.square(self.steer_error) * lasting * calm, there, Steering)
+        steering = correct(
+            memory.steering, Measurement(off, jnp.square(self.steer_error) * lasting * calm, there), Steering
+        )
         fit = Steering(*steering.mean)
         front = (steer - fit.offset) / (1.0 + fit.ratio) - (v_y + self.front_axle_to_cg * turn) / fast
         scale = self.mass * GRAVITY * self.wheelbase
@@ -156,7 +158,9 @@ class Learner(AbstractMethod):
             steer * numerics.sqrt(steering.covariance[0, 0]), numerics.hypot(self.place_spread * turn / fast, 1e-4)
         )
         stays = jnp.square(self.front_stiffness * self.wheelbase / scale * wrong) * (STAYS / self.lasting)
-        turning = correct(memory.turning, moment, (jnp.square(self.moment_error) + stays) * lasting, there, Turning)
+        turning = correct(
+            memory.turning, Measurement(moment, (jnp.square(self.moment_error) + stays) * lasting, there), Turning
+        )
         heading = said.std.yaw_rate_bias / jnp.maximum(fast, QUICK)
         # Share of the steering amplitude that is lost in the play.
         swing = self.play / numerics.sqrt(square + jnp.square(0.1 * self.play))

@@ -9,8 +9,8 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh.estimators.live import AbstractCleaning
-from jaxveh.estimators.navigation.observed import BALANCE, ROLLS, STANDS
-from jaxveh.estimators.navigation.system import Navigator, Parts
+from jaxveh.estimators.misfit import Roughness, learn_roughness, no_roughness
+from jaxveh.estimators.navigation.system import BALANCE, ROLLS, STANDS, Navigator, Parts, channels_of, misfit_of
 from jaxveh.estimators.navigation.window import Past, Window, empty_window, look_back, rotate, window_after
 from jaxveh.vehicles import GRAVITY
 
@@ -24,21 +24,15 @@ LONGEST_SILENCE = 0.25
 """s: after a longer gap of the inertial unit the navigation must restart."""
 
 
-ROUGH_TIME = 2.0
-"""s: time constant of the average roughness of the lateral acceleration."""
-
-
 class Felt(NamedTuple):
     """The last row: its time `t` (s); the unit's last measurements by channel, `held`, and their time, `spoke` (s); the
-    low-passed yaw rate, `smooth` (rad/s); the last two lateral accelerations, `lately` (m/s^2), and their squared roughness,
-    `rough`; the `window` of the past."""
+    low-passed yaw rate, `smooth` (rad/s); the roughness of the lateral acceleration, `rough`; the `window` of the past."""
 
     t: Any
     held: dict[str, Any]
     spoke: Any
     smooth: Any
-    lately: tuple[Any, Any]
-    rough: Any
+    rough: Roughness
     window: Window
 
 
@@ -68,8 +62,8 @@ class Cleaning(AbstractCleaning):
         nothing = jnp.zeros_like(t)
         start = {name: nothing + (GRAVITY if name == "a_z" else 0.0) for name in self.unit}
         spoken = jnp.where(jnp.isnan(values["yaw_rate"]), start["yaw_rate"], values["yaw_rate"])
-        lately = jnp.where(jnp.isnan(values["a_y"]), nothing, values["a_y"])
-        memory = Felt(t, start, t - 2.0 * LONGEST_SILENCE, spoken, (lately, lately), nothing, empty_window(t))
+        rough = no_roughness(values["a_y"])
+        memory = Felt(t, start, t - 2.0 * LONGEST_SILENCE, spoken, rough, empty_window(t))
         return self._with_row(memory, t, values)
 
     def next(self, memory, t, values):
@@ -88,8 +82,9 @@ class Cleaning(AbstractCleaning):
         lost = silent | (dt > LONGEST_SILENCE)
         window = self._window(memory.window, before, now, dt, lost)
         step = jnp.clip(t - memory.spoke, 1e-3, LONGEST_SILENCE)
-        lately, rough = self._roughness(memory, held["a_y"], said, step)
-        cleaned = now | {"step": step, "rough": numerics.sqrt(rough)}
+        rough = learn_roughness(memory.rough, jnp.where(said, values["a_y"], jnp.nan), step)
+        cleaned = now | {"step": step, "rough": numerics.sqrt(rough.variance)}
+        cleaned |= {misfit_of(name): jnp.ones_like(t) for name in channels_of(self.parts)}
         pasts = {}
         for name, lag in self.system.lags.items():
             past = pasts[name] = look_back(window, lag)
@@ -99,15 +94,7 @@ class Cleaning(AbstractCleaning):
             apart = values["wheel_speed_rr"] - values["wheel_speed_rl"] - self.system.track * held["yaw_rate"]
             cleaned["wheels_apart"] = jnp.where(jnp.isnan(apart), 0.0, apart)
         cleaned["felt"] = t - spoke <= LONGEST_SILENCE
-        return Felt(t, held, spoke, smooth, lately, rough, window), cleaned
-
-    def _roughness(self, memory: Felt, a_y, said, step):
-        """The last two lateral accelerations, and the variance of their white noise, from second differences."""
-        bend = a_y - 2.0 * memory.lately[0] + memory.lately[1]
-        share = 1.0 - jnp.exp(-step / ROUGH_TIME)
-        rough = memory.rough + share * (jnp.square(bend) / 6.0 - memory.rough)
-        kept = lambda new, old: jnp.where(said, new, old)
-        return (kept(a_y, memory.lately[0]), kept(memory.lately[0], memory.lately[1])), kept(rough, memory.rough)
+        return Felt(t, held, spoke, smooth, rough, window), cleaned
 
     def _at_centre(self, held, yaw_acceleration) -> dict[str, Any]:
         """Accelerations of the centre of gravity in a plane motion; other channels unchanged."""

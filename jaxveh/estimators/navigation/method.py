@@ -12,9 +12,18 @@ import jax.numpy as jnp
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import row_of
 from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.misfit import Misfit, learn_misfit, no_misfit
 from jaxveh.estimators.navigation.cleaning import Cleaning, Felt
-from jaxveh.estimators.navigation.observed import ANGLES, channels_of, noise, observation, report
-from jaxveh.estimators.navigation.system import Navigator, inputs_of, state_type, states_of, transition
+from jaxveh.estimators.navigation.observed import ANGLES, noise, observation, report
+from jaxveh.estimators.navigation.system import (
+    Navigator,
+    channels_of,
+    inputs_of,
+    misfit_of,
+    state_type,
+    states_of,
+    transition,
+)
 from jaxveh.filters import Extended, kit
 from jaxveh.statespace import Continuous, Gaussian, Prior, Row, StateDependent, StateSpace
 
@@ -48,11 +57,13 @@ def navigation_model(system: Navigator) -> StateSpace:
 
 
 class Known(NamedTuple):
-    """The memory of `Navigation`: the filter's belief, the cleaning's memory `felt`, and whether a fix has started it."""
+    """The memory of `Navigation`: the filter's belief, the cleaning's memory `felt`, whether a fix has started it, and the
+    `misfit` of its channels."""
 
     belief: Any
     felt: Felt
     begun: Any
+    misfit: Misfit
 
 
 class Navigation(AbstractMethod):
@@ -94,19 +105,24 @@ class Navigation(AbstractMethod):
         felt, cleaned = self._cleaning.first(t, values)
         row = row_of(self.model, t, cleaned)
         belief = self.filter.prior(self.model, row)
-        return self._said(belief, felt, jnp.zeros_like(t, bool), row, cleaned, jnp.int32(0))
+        known, said = self._said(belief, felt, jnp.zeros_like(t, bool), row, cleaned, jnp.int32(0))
+        return Known(*known, no_misfit(len(self.model.channels), t)), said
 
     def next(self, memory: Known, t, values):
         felt, cleaned = self._cleaning.next(memory.felt, t, values)
+        cleaned |= {misfit_of(name): memory.misfit.times[k] for k, name in enumerate(self.model.channels)}
         row = row_of(self.model, t, cleaned)
         after, info = self.filter.step(self.model, memory.belief, row)
         goes_on = memory.begun & cleaned["felt"]
         held = dataclasses.replace(memory.belief, t=row.t, u=row.u)
         belief = _choose(goes_on, after, held)
-        return self._said(belief, felt, goes_on, row, cleaned, jnp.where(goes_on, info.result, 0))
+        squares = [jnp.square(error / std) for error, std in zip(info.innovation, info.innovation_std, strict=True)]
+        learnt = learn_misfit(memory.misfit, jnp.stack(squares), t - memory.felt.t)
+        known, said = self._said(belief, felt, goes_on, row, cleaned, jnp.where(goes_on, info.result, 0))
+        return Known(*known, _choose(goes_on, learnt, memory.misfit)), said
 
     def _said(self, belief, felt, begun, row, cleaned, result):
-        """The memory and the answer; a fix starts a navigation that has not started."""
+        """The memory without the misfit, and the answer; a fix starts a navigation that has not started."""
         fix = jnp.isfinite(row.y.speed) & jnp.isfinite(row.y.course) & (row.y.speed > LEAST_SPEED)
         begins = ~begun & fix & cleaned["felt"]
         belief = _choose(begins, self._begun(belief, row), belief)
@@ -120,7 +136,7 @@ class Navigation(AbstractMethod):
         said = said._replace(
             known=type(said.known)(*[one & well for one in said.known]), result=jnp.where(well, said.result, result)
         )
-        return Known(belief, felt, begun), said
+        return (belief, felt, begun), said
 
     def _begun(self, belief, row: Row):
         """The belief with velocity and yaw from a fix, and with their prior standard deviations."""

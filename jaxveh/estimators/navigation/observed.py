@@ -8,16 +8,9 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.names import record, record_type
-from jaxveh.estimators.navigation.system import SLOWEST, Navigator, Parts
+from jaxveh.estimators.navigation.system import BALANCE, ROLLS, SLOWEST, STANDS, Navigator, channels_of, misfit_of
 from jaxveh.estimators.navigation.window import rotate
 from jaxveh.vehicles import GRAVITY
-
-ROLLS, BALANCE = "rolls", "slip_balance"
-"""m/s: pseudo-measurements of zero: the lateral velocity of the rear axle, which is small without lateral forces; and its
-lateral velocity beyond the one that its force implies."""
-
-STANDS = "stands"
-"""rad: pseudo-measurements of zero: roll and pitch of the body beyond its equilibrium on the springs."""
 
 WHEELS_APART = 5.0
 """Factor from the difference of two wheels to the error of their mean. It is large because the error lasts over many rows."""
@@ -30,22 +23,6 @@ BEND = 0.05
 
 STEEPEST = 0.6
 """rad: limit of an axle's slip angle, beyond which the tangent becomes too large."""
-
-
-def channels_of(parts: Parts) -> tuple[str, ...]:
-    """The channels of measurements and of pseudo-measurements of zero."""
-    named = {
-        "heading": parts.heading,
-        "wheel_speed": parts.wheels,
-        ROLLS: parts.axle == "none",
-        BALANCE: parts.axle != "none",
-        "lane_offset": parts.camera,
-        "lane_heading": parts.camera,
-        "a_z": parts.three_more,
-        f"{STANDS}_roll": parts.three_more,
-        f"{STANDS}_pitch": parts.three_more,
-    }
-    return ("speed", "course", *(name for name, there in named.items() if there))
 
 
 ANGLES = ("course", "heading", "lane_heading")
@@ -223,7 +200,7 @@ def noise(system: Navigator, t, x, u) -> dict[str, Any]:
         # Near saturation the law gives less and less information on the slip angle.
         uncertain = numerics.hypot(system.slip_noise / numerics.sqrt(u.step), force * slope)
         std[BALANCE] = 0.02 * shared + jnp.abs(x.v_x) * (1.0 + jnp.square(numerics.tan(angle))) * uncertain
-    return {name: std[name] + 0.0 * x.v_x for name in channels_of(parts)}
+    return {name: std[name] * numerics.sqrt(getattr(u, misfit_of(name))) + 0.0 * x.v_x for name in channels_of(parts)}
 
 
 def report(system: Navigator, t, x, u) -> Any:

@@ -19,6 +19,14 @@ SLOWEST = 0.5
 """m/s: below this speed the direction of the velocity is not used."""
 
 
+ROLLS, BALANCE = "rolls", "slip_balance"
+"""m/s: pseudo-measurements of zero: the lateral velocity of the rear axle, which is small without lateral forces; and its
+lateral velocity beyond the one that its force implies."""
+
+STANDS = "stands"
+"""rad: pseudo-measurements of zero: roll and pitch of the body beyond its equilibrium on the springs."""
+
+
 class Parts(NamedTuple):
     """The parts of a navigation in addition to accelerations, yaw rate, speed and course. `three_more`: the inertial unit's other
     axes; `heading`: the one from two antennas; `wheels`: the speeds of the rear wheels; `camera`: one that sees the lane; `axle`:
@@ -192,19 +200,40 @@ def state_type(parts: Parts) -> Any:
     return record_type("NavigationState", states_of(parts))
 
 
+def channels_of(parts: Parts) -> tuple[str, ...]:
+    """The channels of measurements and of pseudo-measurements of zero."""
+    named = {
+        "heading": parts.heading,
+        "wheel_speed": parts.wheels,
+        ROLLS: parts.axle == "none",
+        BALANCE: parts.axle != "none",
+        "lane_offset": parts.camera,
+        "lane_heading": parts.camera,
+        "a_z": parts.three_more,
+        f"{STANDS}_roll": parts.three_more,
+        f"{STANDS}_pitch": parts.three_more,
+    }
+    return ("speed", "course", *(name for name, there in named.items() if there))
+
+
+def misfit_of(channel: str) -> str:
+    """The name of the input by how much a channel's variance exceeds the one that is assumed."""
+    return f"misfit_{channel}"
+
+
 def inputs_of(parts: Parts) -> tuple[str, ...]:
     """The model's inputs, which `cleaning` makes from a log.
 
     Accelerations at the centre of gravity (m/s^2) and rates (rad/s), held where the unit has no measurement; the `step` (s) since
     the unit's last measurement; the roughness of the lateral acceleration, `rough` (m/s^2); the difference of the rear wheels'
-    speeds beyond that of turning, `wheels_apart` (m/s); and for each of `Navigator.lags` the fields of `window.Past`, as
-    `sky_turned` and so on.
+    speeds beyond that of turning, `wheels_apart` (m/s); for each of `Navigator.lags` the fields of `window.Past`, as `sky_turned`
+    and so on; and the misfit of each channel.
     """
     names = ("sky", *(("camera",) if parts.camera else ()), *(("half", "whole") if parts.axle != "none" else ()))
     pasts = tuple(f"{name}_{what}" for name in names for what in ("turned", "gained_x", "gained_y", "spun", "rolled"))
     more = ("a_z", "roll_rate", "pitch_rate") if parts.three_more else ()
     more += ("wheels_apart",) if parts.wheels else ()
-    return ("a_x", "a_y", "yaw_rate", "step", "rough", *pasts, *more)
+    return ("a_x", "a_y", "yaw_rate", "step", "rough", *pasts, *more, *[misfit_of(name) for name in channels_of(parts)])
 
 
 def transition(system: Navigator, t0, t1, x, u):

@@ -14,7 +14,7 @@ from jaxveh.estimators.body_motion import LATERAL, SILENCE, AbstractMotionMethod
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import answer
-from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
+from jaxveh.estimators.sequential import Belief, Measurement, belief_of, correct, move, spread_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -89,8 +89,8 @@ class SixAxis(AbstractMotionMethod):
         belief = move(memory.belief, step, {name: jnp.square(std) * dt for name, std in noise.items()}, State)
         lasting = jnp.square(self.slip) * 2.0 * self.slip_time / jnp.maximum(dt, 1e-3)
         there = heard["silence"] < SILENCE
-        belief = correct(belief, lambda x: heard["v_x"] - x.v_x, jnp.square(self.v_noise), there, State)
-        belief = correct(belief, lambda x: -x.v_y, lasting, there, State)
+        belief = correct(belief, Measurement(lambda x: heard["v_x"] - x.v_x, jnp.square(self.v_noise), there), State)
+        belief = correct(belief, Measurement(lambda x: -x.v_y, lasting, there), State)
         x = State(*belief.mean)
         wide = {name: spread_of(belief, {name: 1.0}, State) for name in State._fields}
         tilt = numerics.tan(jnp.clip(x.pitch, -0.7, 0.7)) * r

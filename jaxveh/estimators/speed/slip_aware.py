@@ -10,6 +10,7 @@ from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import steer_heard
 from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.misfit import learn_misfit, no_misfit
 from jaxveh.estimators.sequential import (
     Belief,
     Innovation,
@@ -32,8 +33,10 @@ from jaxveh.estimators.speed.slip_state import (
     SpeedState,
     Spreads,
     beyond,
+    bound_by_two,
     front_rear,
     own_radii,
+    roughness_of_wheels,
 )
 from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, wheel_values
 from jaxveh.estimators.two_axles import slip_stiffness
@@ -105,7 +108,7 @@ class SlipAware(AbstractMethod):
         mean = SpeedState(v_x, zero, zero, zero, zero + self.gain, *[zero] * 7, sinking=zero + self.sinking)
         std = SpeedState(
             jnp.where(count > 0, 0.3 + 0.03 * jnp.abs(v_x), 30.0), 3.0, s.slope, s.offset, s.gain,
-            0.5 * s.radius, *[0.0 * s.radius] * 4, *[s.softness] * 2, sinking=s.sinking,
+            s.common_radius, *[0.0 * s.radius] * 4, *[s.softness] * 2, sinking=s.sinking,
         )  # fmt: skip
         stack = lambda state: jnp.stack([jnp.asarray(one, t.dtype) for one in state])
         belief = Belief(stack(mean), jnp.diag(jnp.square(stack(std))) + own_radii(s.radius))
@@ -113,7 +116,7 @@ class SlipAware(AbstractMethod):
         ones = jnp.ones_like(wheels)
         memory = Memory(
             belief, t, dict.fromkeys(HELD, zero), dict.fromkeys(HELD, never), jnp.where(there, wheels, v_x), t * ones, ones,
-            0.0 * ones, zero, t,
+            0.0 * ones, zero, t, no_misfit(3, t), (jnp.where(there, wheels, v_x),) * 2,
         )  # fmt: skip
         return memory, self._answer(memory)
 
@@ -122,15 +125,16 @@ class SlipAware(AbstractMethod):
         memory = memory._replace(heard=heard, at=at)
         step = jnp.maximum(t - memory.t, 0.0)
         belief = self._move(memory, step)
-        told = innovation(belief, self._felt, values["a_x"], jnp.square(self.spreads.a_x))
+        wheels = wheel_values(values)
+        told = innovation(belief, self._felt, values["a_x"], memory.misfit.times[0] * jnp.square(self.spreads.a_x))
         belief = update(belief, told, self._gate(told, 2.0 * self.gate))
         memory = memory._replace(rate=self._smooth_rate(memory, belief, step))
-        belief = self._satellite(memory, belief, values["speed"])
-        belief, memory = self._use_wheels(memory, belief, t, step, wheel_values(values))
-        memory = memory._replace(belief=belief, t=t)
+        fix = self._satellite(memory, belief, values["speed"])
+        belief = update(belief, fix, self._gate(fix, self.gate))
+        misfit, lately = self._learn(memory, step, (told, values["a_x"]), (fix, values["speed"]), wheels)
+        belief, memory = self._use_wheels(memory, belief, t, step, wheels)
+        memory = memory._replace(belief=belief, t=t, misfit=misfit, lately=lately)
         return memory, self._answer(memory)
-
-    # The last measurements.
 
     def _hear(self, memory: Memory, t, values):
         now = dict(values) | {"steer": steer_heard(values, self.car.steering_ratio, self.car.steer_offset)}
@@ -141,8 +145,6 @@ class SlipAware(AbstractMethod):
 
     def _speaks(self, memory: Memory, name: str):
         return memory.t - memory.at[name] <= PATIENCE
-
-    # The motion.
 
     def _lateral(self, memory: Memory, x: SpeedState):
         """Yaw rate (rad/s), lateral acceleration (m/s^2), and the lateral speed (m/s) of a steady turn."""
@@ -187,13 +189,11 @@ class SlipAware(AbstractMethod):
         now = self._acceleration(memory, SpeedState(*belief.mean))
         return memory.rate + (1.0 - jnp.exp(-step / self.smoothing)) * (now - memory.rate)
 
-    # The measurements.
-
     def _felt(self, mean):
         x = SpeedState(*mean)
         return (1.0 + x.gain) * x.force + x.offset
 
-    def _satellite(self, memory: Memory, belief: Belief, value) -> Belief:
+    def _satellite(self, memory: Memory, belief: Belief, value) -> Innovation:
         lag = self.satellite_delay - self.a_x_delay
 
         def over_ground(mean):
@@ -202,8 +202,17 @@ class SlipAware(AbstractMethod):
             return numerics.hypot(x.v_x - lag * memory.rate, v_y)
 
         spread = self.spreads.satellite + 0.3 * lag * jnp.abs(memory.rate)
-        found = innovation(belief, over_ground, value, jnp.square(spread))
-        return update(belief, found, self._gate(found, self.gate))
+        return innovation(belief, over_ground, value, memory.misfit.times[1] * jnp.square(spread))
+
+    def _learn(self, memory: Memory, step, felt, fix, wheels):
+        """The misfit after the innovations of accelerometer and satellites, each with its measurement, and after the wheels,
+        whose innovations are slip, too; and the wheels' last two speeds."""
+        squares = [
+            jnp.where(jnp.isnan(value), jnp.nan, jnp.square(one.residual) / one.variance) for one, value in (felt, fix)
+        ]
+        white = memory.misfit.times[2] * self._white(memory.belief)
+        rough, lately = roughness_of_wheels(wheels, memory.lately, white)
+        return learn_misfit(memory.misfit, jnp.stack([*squares, rough]), step), lately
 
     def _gate(self, found, most):
         """The weight of an innovation: 1 within `most` standard deviations, beyond them falling with the eighth power."""
@@ -247,8 +256,6 @@ class SlipAware(AbstractMethod):
         known = jnp.stack([self._speaks(memory, name) for name in brakes]) & self._speaks(memory, "drive_torque")
         return jnp.where(known, by_torque, force) / load - car.rolling_resistance, load
 
-    # The wheels.
-
     def _use_wheels(self, memory: Memory, belief: Belief, t, step, wheels):
         there = ~jnp.isnan(wheels)
         waited = jnp.where(there, t - memory.smooth_at, 0.0)
@@ -257,6 +264,7 @@ class SlipAware(AbstractMethod):
         rates = (jnp.where(there, wheels, smooth) - smooth) / self.smoothing
         # Without an accelerometer the car's rate is that of the wheels.
         gate = self.rate_gate * jnp.where(self._speaks(memory, "a_x"), 1.0, 4.0)
+        gate = gate * numerics.sqrt(memory.misfit.times[2])
         steady = beyond((rates - memory.rate) / gate)
         said = self._wheels(memory, belief.mean)
         suspicion = memory.suspicion * jnp.exp(-step / self.spreads.suspicion_time)
@@ -284,7 +292,9 @@ class SlipAware(AbstractMethod):
         before = belief.mean
         belief = update_by_each(belief, found, jnp.where(there, trust * lasts, 0.0))
         rolling = rolling._replace(residual=rolling.residual - rolling.slope @ (belief.mean - before))
-        belief = self._bound(belief, rolling, there, white, most)
+        # A one-sided bound turns noise into a bias: only where most wheels are at their limit.
+        sure = most * smooth_step(jnp.abs(belief.mean[1]) - self.bound_force)
+        belief = bound_by_two(belief, rolling, there, white, sure)
         locked = jnp.all(jnp.where(there, wheels == 0.0, memory.smooth == 0.0))
         strange = jnp.any(there & (steady < 0.5)) | locked
         return belief, memory._replace(
@@ -308,27 +318,17 @@ class SlipAware(AbstractMethod):
         far = numerics.sqrt(jnp.square(found.residual) / found.variance)
         return beyond(far / (self.gate * (1.0 + 4.0 * calm * agree)))
 
+    def _white(self, belief: Belief):
+        """The variance of a wheel's white noise that is assumed, (m/s)^2."""
+        return jnp.square(self.spreads.wheel) + jnp.square(self.spreads.wheel_share * belief.mean[0])
+
     def _wheel_variances(self, memory: Memory, belief: Belief, said: Said):
         s, v_x = self.spreads, jnp.abs(belief.mean[0])
         yaw_rate = self._lateral(memory, SpeedState(*belief.mean))[0]
         near_limit = s.peak_slip * jnp.square(jnp.square(said.share))
-        white = jnp.square(s.wheel) + jnp.square(s.wheel_share * v_x)
+        white = memory.misfit.times[2] * self._white(belief)
         parts = [s.turn * yaw_rate, s.slip_share * said.slip * v_x, near_limit * v_x]
         return white, sum(jnp.square(one) for one in parts)
-
-    def _bound(self, belief: Belief, rolling: Innovation, there, white, most) -> Belief:
-        """The update by two wheels that bound the speed: no braked wheel is faster than the car, no driven one slower.
-
-        Used only where most wheels are at their limit (`most`), because a one-sided bound turns noise into a bias. A single
-        wheel may be driven in a car that brakes, by the engine or a lifted wheel's differential.
-        """
-        force = belief.mean[1]
-        over = jnp.where(there, jnp.where(force < 0.0, 1.0, -1.0) * rolling.residual, -jnp.inf)
-        second = jnp.argsort(over)[-2]
-        slope = rolling.slope[second]
-        one = Innovation(rolling.residual[second], slope @ belief.covariance @ slope + white, slope)
-        sure = most * smooth_step(jnp.abs(force) - self.bound_force)
-        return update(belief, one, jnp.where(over[second] > 0.0, sure, 0.0))
 
     def _answer(self, memory: Memory):
         mean, covariance = memory.belief

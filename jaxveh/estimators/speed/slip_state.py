@@ -10,7 +10,8 @@ import numpy as np
 
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.sequential import Belief
+from jaxveh.estimators.misfit import OUTLIER, Misfit, white_part
+from jaxveh.estimators.sequential import Belief, Innovation, update
 from jaxveh.estimators.speed.accelerometer import AbstractOffsetAndSlope
 from jaxveh.vehicles import kit as vehicles
 
@@ -76,9 +77,9 @@ class Spreads(AbstractOffsetAndSlope):
     """Standard deviations of the prior, of the random walks, and of the measurements.
 
     Walks are per root second. A softness decays to the file's with `softness_time` (s), with a random walk that keeps its
-    standard deviation. `radius` (-) is that of each wheel's own radius error; the common one has half of it; `sinking` (-) that
-    of the state of this name. `wheel` (m/s) is the quantisation of the sensor's teeth, `wheel_share` (-) is proportional to the
-    speed.
+    standard deviation. `radius` (-) is that of each wheel's own radius error; `common_radius` (-) that of the file's radius,
+    often that of a tyre without load, 1 to 3 % larger than the one on which it rolls; `sinking` (-) that of the state of this
+    name. `wheel` (m/s) is the quantisation of the sensor's teeth, `wheel_share` (-) is proportional to the speed.
 
     The following errors are correlated in time, so that `repeats` (-) samples count as one: `slip_share` (-), a share of the
     expected slip; `peak_slip` (-), unknown slip at a force equal to the load, which falls with the fourth power of the force;
@@ -89,6 +90,7 @@ class Spreads(AbstractOffsetAndSlope):
 
     gain: jax.Array = positive("-", default=0.012)
     radius: jax.Array = positive("-", default=0.004)
+    common_radius: jax.Array = positive("-", default=0.015)
     radius_walk: jax.Array = positive("1/sqrt(s)", default=1e-4)
     softness: jax.Array = positive("-", default=0.35)
     softness_time: jax.Array = positive("s", default=300.0)
@@ -111,7 +113,8 @@ class Spreads(AbstractOffsetAndSlope):
 class Memory(NamedTuple):
     """The belief and its time `t` (s); the last measurements by channel, `heard`, and their times `at` (s); for each wheel the
     low-passed speed `smooth` (m/s), its time `smooth_at` (s), its `trust` (-), and the `suspicion` (-) that it is at its limit;
-    the car's low-passed acceleration `rate` (m/s^2); the time `lost` (s) since which no wheel was trusted."""
+    the car's low-passed acceleration `rate` (m/s^2); the time `lost` (s) since which no wheel was trusted; the `misfit` of
+    accelerometer, satellites and wheels, and the last two speeds of each wheel, `lately` (m/s)."""
 
     belief: Belief
     t: Any
@@ -123,6 +126,8 @@ class Memory(NamedTuple):
     suspicion: Any
     rate: Any
     lost: Any
+    misfit: Misfit
+    lately: tuple[Any, Any]
 
 
 class Said(NamedTuple):
@@ -151,3 +156,27 @@ def own_radii(std: Any) -> Any:
     deviations `std` less that of their mean."""
     free = jnp.eye(4, dtype=std.dtype) - 0.25
     return jnp.zeros((STATES, STATES), std.dtype).at[RADII, RADII].set(free * jnp.square(std))
+
+
+def roughness_of_wheels(wheels: Any, lately: tuple[Any, Any], white: Any) -> tuple[Any, tuple[Any, Any]]:
+    """The mean square of the wheels' white noise over the variance `white`, NaN without a wheel, each at most `OUTLIER`; and
+    their last two speeds after this row."""
+    there = ~jnp.isnan(wheels)
+    last, before = lately
+    parts = jnp.minimum(jnp.square(white_part(jnp.where(there, wheels, last), last, before)) / white, OUTLIER)
+    count = jnp.sum(there.astype(parts.dtype))
+    mean = jnp.sum(jnp.where(there, parts, 0.0)) / jnp.maximum(count, 1.0)
+    return jnp.where(count > 0, mean, jnp.nan), (jnp.where(there, wheels, last), jnp.where(there, last, before))
+
+
+def bound_by_two(belief: Belief, rolling: Innovation, there: Any, white: Any, sure: Any) -> Belief:
+    """The belief after two wheels that bound the speed: no braked wheel is faster than the car, no driven one slower. `rolling`
+    (4,): the innovations without slip; `sure`: the weight.
+
+    A single wheel may be driven in a car that brakes, by the engine or a lifted wheel's differential.
+    """
+    over = jnp.where(there, jnp.where(belief.mean[1] < 0.0, 1.0, -1.0) * rolling.residual, -jnp.inf)
+    second = jnp.argsort(over)[-2]
+    slope = rolling.slope[second]
+    one = Innovation(rolling.residual[second], slope @ belief.covariance @ slope + white, slope)
+    return update(belief, one, jnp.where(over[second] > 0.0, sure, 0.0))

@@ -11,6 +11,7 @@ from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractSmoothable, answer
+from jaxveh.estimators.misfit import Misfit, learn_misfit, no_misfit
 from jaxveh.estimators.sequential import Belief, implicit_step, innovation, update
 from jaxveh.estimators.stiffness.single_track import LEAN, Followed, LinearCar, Signals
 from jaxveh.estimators.two_axles import LATERAL, LOWEST
@@ -22,6 +23,9 @@ sensors and steer (s)."""
 
 SATELLITE = (Need("course", "rad", optional=True),)
 
+MEASURED = ("yaw_rate", "a_y", "course")
+"""The channels that the filter measures; speed and steer are its inputs."""
+
 
 LONGEST_WAIT = 1.0
 """s: the longest time between two fixes of a satellite receiver that counts as available."""
@@ -32,15 +36,20 @@ cars, whatever the filter's own standard deviation. This standard deviation of l
 driving with a course; in as much as `FORGOTTEN` s without one it returns."""
 
 
+OF_THE_CAR = 0.04
+"""Relative standard deviation of a stiffness by errors of mass, inertia and lengths in the car's file, which no drive shows."""
+
+
 class WalkMemory(NamedTuple):
     """The signals; the belief of the states; the low-passed rate of the course, a_y / v (rad/s); the time since the last course,
-    and for how long the car has lately driven with one, `guided` (s)."""
+    and for how long the car has lately driven with one, `guided` (s); the `misfit` of yaw rate, a_y and course."""
 
     signals: Signals
     belief: Belief
     turning: Any
     course_age: Any
     guided: Any
+    misfit: Misfit
 
 
 class WalkingStiffness(AbstractSmoothable):
@@ -84,7 +93,7 @@ class WalkingStiffness(AbstractSmoothable):
         signals = self.followed.start(t, values)
         mean = jnp.zeros((STATES,), self.spread.dtype).at[7].set(LEAN)
         zero = jnp.zeros_like(t)
-        memory = WalkMemory(signals, Belief(mean, self._start()), zero, zero + 1e3, zero)
+        memory = WalkMemory(signals, Belief(mean, self._start()), zero, zero + 1e3, zero, no_misfit(3, t))
         return memory, self.say(memory)
 
     def next(self, memory, t, values):
@@ -94,20 +103,28 @@ class WalkingStiffness(AbstractSmoothable):
         turning = memory.turning + share * (now.a_y / (1.0 + LEAN) / v_x - memory.turning)
         start = belief = self.ahead(memory, t, values)
         rough = 1.0 + jnp.square(jnp.square(now.a_y / self.linear))
-        heard = lambda belief, value, expect, noise: update(
-            belief, innovation(belief, expect, value, jnp.square(noise) * rough)
-        )
-        belief = heard(belief, values["yaw_rate"], lambda x: x[1] + x[6], self.yaw_rate_noise)
         felt = lambda x: self._forces(x, now)[2] * (1.0 + x[7]) + x[5]
-        belief = heard(belief, values["a_y"], felt, self.a_y_noise)
         seen = lambda x: x[8] + x[0] / v_x
-        ahead = seen(belief.mean)
-        late = values["course"] + self.course_delay * turning
-        belief = heard(belief, ahead + numerics.wrap_angle(late - ahead), seen, self.course_noise / v_x)
+        expected = (lambda x: x[1] + x[6]), felt, seen
+        noises = self.yaw_rate_noise, self.a_y_noise, self.course_noise / v_x
+        squares = []
+        for name, expect, noise, times in zip(MEASURED, expected, noises, memory.misfit.times, strict=True):
+            value = values[name]
+            if name == "course":
+                ahead = seen(belief.mean)
+                value = ahead + numerics.wrap_angle(value + self.course_delay * turning - ahead)
+            found = innovation(belief, expect, value, times * rough * jnp.square(noise))
+            squares.append(jnp.where(jnp.isnan(value), jnp.nan, jnp.square(found.residual) / found.variance))
+            belief = update(belief, found)
+        misfit = learn_misfit(memory.misfit, jnp.stack(squares), dt)
         age = jnp.where(jnp.isnan(values["course"]), memory.course_age + dt, 0.0)
-        guided = jnp.where(age < LONGEST_WAIT, memory.guided + dt, memory.guided * jnp.exp(-dt / FORGOTTEN))
-        belief, guided = jax.tree.map(lambda a, b: jnp.where(now.moves, a, b), (belief, guided), (start, memory.guided))
-        after = WalkMemory(now, belief, turning, age, guided)
+        guided = jnp.where(
+            age < LONGEST_WAIT, memory.guided + dt / misfit.times[2], memory.guided * jnp.exp(-dt / FORGOTTEN)
+        )
+        belief, guided, misfit = jax.tree.map(
+            lambda a, b: jnp.where(now.moves, a, b), (belief, guided, misfit), (start, memory.guided, memory.misfit)
+        )
+        after = WalkMemory(now, belief, turning, age, guided, misfit)
         return after, self.say(after)
 
     def ahead(self, memory, t, values):
@@ -163,7 +180,7 @@ class WalkingStiffness(AbstractSmoothable):
     def say(self, memory):
         now, (x, P) = memory.signals, memory.belief
         blind = BLIND * jnp.exp(-memory.guided / GUIDED)
-        std = jnp.sqrt(jnp.diagonal(P)[2:4] + jnp.square(blind))
+        std = jnp.sqrt(jnp.diagonal(P)[2:4] + jnp.square(blind) + OF_THE_CAR**2)
         file = (self.car.front_cornering_stiffness, self.car.rear_cornering_stiffness)
         names = ("front_cornering_stiffness", "rear_cornering_stiffness")
         mean = {name: file[k] * jnp.exp(jnp.clip(x[2 + k], -1.6, 1.6)) for k, name in enumerate(names)}
