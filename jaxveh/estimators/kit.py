@@ -5,7 +5,8 @@ from jaxveh.estimators.contract import Need, check_needs, cut_pieces, in_words, 
 from jaxveh.estimators.following import follow, follow_rows, smooth_rows
 from jaxveh.estimators.live import AbstractCleaning, AsItIs, clean_recording
 from jaxveh.estimators.method import AbstractSmoothable, answer, method_of
-from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
+from jaxveh.estimators.misfit import Misfit, Roughness, learn_misfit, learn_roughness, no_misfit, no_roughness
+from jaxveh.estimators.sequential import Belief, Measurement, belief_of, correct, correct_by_each, move, spread_of
 
 __all__ = [
     "FULL_CAR",
@@ -13,21 +14,29 @@ __all__ = [
     "AbstractSmoothable",
     "AsItIs",
     "Belief",
+    "Measurement",
+    "Misfit",
     "Need",
+    "Roughness",
     "answer",
     "belief_of",
     "catalogue",
     "check_needs",
     "clean_recording",
     "correct",
+    "correct_by_each",
     "cut_pieces",
     "follow",
     "follow_rows",
     "in_words",
     "keys_asked",
+    "learn_misfit",
+    "learn_roughness",
     "method_of",
     "model_of",
     "move",
+    "no_misfit",
+    "no_roughness",
     "smooth_rows",
     "spans_of",
     "spread_of",
