@@ -40,9 +40,7 @@ def test_beyond_a_gate_a_correction_stays_the_same_or_falls(gate, fall, error):
     variance = belief.covariance[0, 0] + 0.2
     value = belief.mean[0] + error * np.sqrt(variance)
     error_of, noise = (lambda state: value - state.x), jnp.asarray(0.2)
-    ask = lambda gate, fall: sequential.correct(
-        belief, sequential.Measurement(error_of, noise, True, gate, fall), one
-    )
+    ask = lambda gate, fall: sequential.correct(belief, sequential.Measurement(error_of, noise, True, gate, fall), one)
     plain, gated = ask(None, 1.0), ask(gate, fall)
     weight = 1.0 if abs(error) < gate else (gate / abs(error)) ** fall
     moved, whole = np.asarray(gated.mean - belief.mean), np.asarray(plain.mean - belief.mean)

@@ -15,6 +15,7 @@ from jaxveh.estimators.misfit import Misfit, learn_misfit, no_misfit
 from jaxveh.estimators.sequential import Belief, implicit_step, innovation, update
 from jaxveh.estimators.stiffness.single_track import LEAN, Followed, LinearCar, Signals
 from jaxveh.estimators.two_axles import LATERAL, LOWEST
+from jaxveh.vehicles import GRAVITY
 
 STATES = 10
 """Number of states: v_y (m/s), yaw rate (rad/s), ln of both stiffnesses over the file's, offsets of steer (rad), a_y (m/s^2) and
@@ -55,13 +56,14 @@ class WalkMemory(NamedTuple):
 class WalkingStiffness(AbstractSmoothable):
     """An extended Kalman filter of [v_y, yaw rate, ln C_f, ln C_r, offsets of steer, a_y and yaw rate, lean, yaw, delay].
 
-    The model is the linear single track with the file's mass, inertia and lengths. The measurements are yaw rate, lateral
-    acceleration and, if the log has it, the satellites' `course = yaw + v_y / v` (references [46, 47]), the only one that depends
-    directly on the sideslip. It is delayed by `course_delay` (s) against the inertial sensors; the filter adds its change since,
-    the integral of a_y / v. Errors that could be mistaken for stiffness are states of their own: offsets, and the body's lean,
-    which increases the measured acceleration. Where tyres leave their linear range (`linear`, m/s^2 of lateral acceleration),
-    measurements count less and less. Also on a slippery road the estimate is the slope at zero slip, as long as the lateral
-    acceleration is small.
+    The model is the single track with the file's mass, inertia and lengths, and axles that bend as those of a dry road do
+    (`grip`, -: their largest lateral force over load): driven with a_y of 3 m/s^2 RMS, linear ones would be found a tenth
+    too soft. The measurements are yaw rate, lateral acceleration and, if the log has it, the satellites'
+    `course = yaw + v_y / v` (references [46, 47]), the only one that depends directly on the sideslip. It is delayed by
+    `course_delay` (s) against the inertial sensors; the filter adds its change since, the integral of a_y / v. Errors that
+    could be mistaken for stiffness are states of their own: offsets, and the body's lean, which increases the measured
+    acceleration. Where axles bend (`linear`, m/s^2 of lateral acceleration), measurements count less and less. On a slippery
+    road they bend sooner, and look soft.
 
     Without a course a stiffness is not known (`BLIND`).
 
@@ -83,6 +85,7 @@ class WalkingStiffness(AbstractSmoothable):
     course_noise: jax.Array = positive("m/s", default=0.07)
     course_delay: jax.Array = positive("s", default=0.125)
     linear: jax.Array = positive("m/s^2", default=4.0)
+    grip: jax.Array = positive("-", default=1.1)
     known_spread: jax.Array = positive("-", default=0.07)
 
     @property
@@ -157,6 +160,9 @@ class WalkingStiffness(AbstractSmoothable):
         steer = now.steer - x[9] * (now.steer - now.slow_steer) / self.followed.lag
         front = front * (steer - car.steer_offset - x[4] - (x[0] + car.front_axle_to_cg * x[1]) / v_x)
         rear = -rear * (x[0] - car.rear_axle_to_cg * x[1]) / v_x
+        length = car.front_axle_to_cg + car.rear_axle_to_cg
+        grips = (self.grip * car.mass * GRAVITY / length * arm for arm in (car.rear_axle_to_cg, car.front_axle_to_cg))
+        front, rear = (_bent(force, grip) for force, grip in zip((front, rear), grips, strict=True))
         return front, rear, (front + rear) / car.mass
 
     def _move(self, belief: Belief, now: Signals, dt) -> Belief:
@@ -186,3 +192,8 @@ class WalkingStiffness(AbstractSmoothable):
         mean = {name: file[k] * jnp.exp(jnp.clip(x[2 + k], -1.6, 1.6)) for k, name in enumerate(names)}
         known = {name: now.moves & (std[k] < self.known_spread) for k, name in enumerate(names)}
         return answer(mean, {name: mean[name] * std[k] for k, name in enumerate(names)}, known)
+
+
+def _bent(force: Any, grip: Any) -> Any:
+    """The force of an axle given that of its slope at zero slip, and its `grip`: the curve of `RearAxle` with a shape of 2."""
+    return force / numerics.sqrt(1.0 + jnp.square(force / grip))
