@@ -78,17 +78,17 @@ def smooth_rows(method: AbstractSmoothable, time: Any, values: dict[str, Any]) -
     """`follow_rows`, but each answer uses all rows: the smoother of H. Rauch, F. Tung, C. Striebel (1965), extended, with the
     slopes at the filter's means (Sarkka 2013, sec. 9.1). What the memory holds beside the belief looks back only."""
     take = lambda rows: jax.tree.map(lambda leaf: leaf[rows], (time, values))
-    start, rest = take(0), take(slice(1, None))
+    start, (times, rows) = take(0), take(slice(1, None))
     first, _ = apart(method.first, start[0], *start)
     turn = lambda memory: memory.belief
-    if numerics.pieces_of(len(rest[0])) == 1:
-        all_rows = numerics.Piece(*rest, jnp.ones(len(rest[0]), bool))
+    if numerics.pieces_of(len(times)) == 1:
+        all_rows = numerics.Piece(times, rows, jnp.ones(len(times), bool))
         last, memories = _forward(method, first, all_rows)
         _, said = _backward(method, turn(last), memories, all_rows)
     else:
         ahead = lambda memory, piece: _forward(method, memory, piece)[0]
         back = lambda later, memory, piece: _backward(method, later, _forward(method, memory, piece)[1], piece)
-        last, said = numerics.there_and_back(ahead, back, first, turn, *rest)
+        last, said = numerics.there_and_back(ahead, back, first, turn, times, rows)
     return jax.tree.map(lambda a, b: jnp.concatenate([a, jnp.asarray(b)[None]]), said, method.say(last))
 
 
