@@ -11,10 +11,10 @@ import jax.numpy as jnp
 OUTLIER = 9.0
 """Largest squared innovation over its predicted variance that counts: that of three standard deviations."""
 
-FIRST = 0.5
+FIRST = 0.2
 """s: for how long the first misfit counts as learnt."""
 
-CAUTION = 9.0
+CAUTION = 4.0
 """The misfit before the first row: what is believed of a noisy log before its noise is known would stay believed."""
 
 LEARN_TIME = 20.0
@@ -33,10 +33,11 @@ class Misfit(NamedTuple):
     since: Any
 
 
-def no_misfit(count: int, like: Any, first: float = CAUTION) -> Misfit:
-    """The misfit of `count` measurements before the first row, in the dtype of `like`."""
+def no_misfit(count: int, like: Any, first: float = CAUTION, seconds: float = FIRST) -> Misfit:
+    """The misfit of `count` measurements before the first row, in the dtype of `like`: `first`, as if learnt from so many
+    `seconds`."""
     ones = jnp.ones((count,), jnp.result_type(like))
-    return Misfit(first * ones, FIRST * ones, 0.0 * ones)
+    return Misfit(first * ones, seconds * ones, 0.0 * ones)
 
 
 def learn_misfit(misfit: Misfit, squares: Any, dt: Any, learn_time: Any = LEARN_TIME) -> Misfit:
@@ -71,10 +72,13 @@ def no_roughness(value: Any) -> Roughness:
 
 def learn_roughness(rough: Roughness, value: Any, dt: Any) -> Roughness:
     """The roughness after another measurement, NaN where missing, `dt` (s) after the last."""
+    here = ~jnp.isnan(value)
+    # Without this replacement the derivative would be NaN even where its result is not used.
+    value = jnp.where(here, value, rough.last)
     share = 1.0 - jnp.exp(-dt / ROUGH_TIME)
     news = jnp.square(white_part(value, rough.last, rough.before))
     after = Roughness(rough.variance + share * (news - rough.variance), value, rough.last)
-    return jax.tree.map(lambda new, old: jnp.where(jnp.isnan(value), old, new), after, rough)
+    return jax.tree.map(lambda new, old: jnp.where(here, new, old), after, rough)
 
 
 def white_part(value: Any, last: Any, before: Any) -> Any:

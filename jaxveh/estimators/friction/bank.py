@@ -116,7 +116,8 @@ class FrictionBank(AbstractMethod):
         bank = Bank(jnp.log(self._prior()), *self._start())
         along = None if self.along is None else self.along.start(t)
         return self._said(
-            BankMemory(start_told(t, values), bank, along, jnp.zeros_like(t), no_misfit(2, t, first=1.0)), 0.0
+            BankMemory(start_told(t, values), bank, along, jnp.zeros_like(t), no_misfit(2, t, first=1.0, seconds=0.5)),
+            0.0,
         )
 
     def next(self, memory, t, values):
