@@ -46,6 +46,7 @@ NO_RESULT = {
     "PosteriorBound": "a bound of theory, a NamedTuple of arrays",
     "Runs": "of a study over many runs, a NamedTuple of arrays",
     "InnovationPoints": "what a figure draws",
+    "Piece": "rows of a pass forward and back, a NamedTuple of arrays",
     "LaggedLoads": "its time is a time constant",
     "Channel": "its time is the name of a column",
     "ChannelMap": "its time is the name of a column",

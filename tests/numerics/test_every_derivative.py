@@ -24,6 +24,8 @@ NONE = {
     "polynomials": "a module: of the elementary functions, which are here",
     "sigma_points": "a module: of constant points and weights",
     "barriers_hold": "a fact of the platform",
+    "Piece": "a record of rows",
+    "pieces_of": "a count",
     "on_cpu": "a fact of the platform",
     "pays_alone": "a fact of the platform",
     "cauchy": "numbers of a key, which has no derivative",
@@ -145,8 +147,18 @@ CASES: dict[str, Callable] = {
     "tan": lambda x: numerics.tan(x),
     "write_out": lambda x: mixed(numerics.write_out(lambda c: jnp.sin(c @ c.T), factor(x))),
     "wrap_angle": lambda x: numerics.wrap_angle(3 * x + 7.0) * x,
+    "there_and_back": lambda x: mixed(forward_and_back(x)) / 3,
     "total": lambda x: numerics.total(jnp.sin(x * jnp.arange(90, dtype=x.dtype) / 50)) / 20,
 }
+
+
+def forward_and_back(x):
+    """A sum forward, and back what it was with the one of what comes later."""
+    rows = jnp.arange(6, dtype=x.dtype) / 5
+    ahead = lambda carry, piece: carry + jnp.sum(jnp.where(piece.there, numerics.sin(x * piece.rows), 0.0))
+    back = lambda later, carry, piece: (later + carry, carry * piece.rows + later)
+    last, shown = numerics.there_and_back(ahead, back, x, lambda carry: carry * carry, rows, rows)
+    return shown + last
 
 
 def test_every_public_name_has_a_case_or_a_reason():
