@@ -30,6 +30,13 @@ LATERAL = (Need("a_y", "m/s^2"), Need("yaw_rate", "rad/s"), Need("a_x", "m/s^2",
 SILENCE = 0.5
 """s: a quantity counts as unknown after its channels have had no measurement for so long."""
 
+STEERING = Need("steering_wheel", "rad")
+"""The steering wheel's angle, for a method that requires it."""
+
+SLOWEST = 3.0
+"""m/s: the speed at which the road passes is at least this, so that the laws of its bank and grade have a spread at
+standstill."""
+
 CRAWL = 2.0
 """m/s: below this speed, angles that are divided by it are regularised."""
 

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_from_zero
+from jaxveh.estimators.body_motion import LATERAL, SILENCE, SLOWEST, BodyMotion, away_from_zero
 from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
@@ -42,11 +42,6 @@ LINEAR = 4.0
 
 FALL = 4.0
 """How fast the weight of a slip angle falls beyond the gate: with 1 or 2 a sliding axle still turns into a bank."""
-
-SLOWEST = 3.0
-"""m/s: the speed at which the road passes is at least this, so that the laws of its bank and grade have a spread at
-standstill."""
-
 
 MORE = ("v_y", "rear_scale", "roll_scale", "a_y_bias", "yaw_rate_bias", "roll_rate_bias")
 """States that are reported in addition to bank and roll."""
@@ -79,7 +74,8 @@ class Leaning(AbstractSmoothable):
     they were chosen: otherwise an offset that is larger than expected is a bank that counts as known. An axle that slides has
     a slip angle that its force does not give, on ice at any acceleration: the further off it is, the less it counts
     (`slip_gate`), also where steer and yaw rate do not agree (`steering`, None: not checked), and then the kinematics hold
-    alone. They take a slide that grows slowly for a bank.
+    alone. They take a slide that grows slowly for a bank. How noisy the log is, beyond the noises below, is learned: of the
+    measurements as their `Misfit`, of a_y and yaw rate, which are inputs, as their `Roughness`.
 
     **Parameters**: `rear_axle_to_cg` (m); `rear_compliance` (rad/(m/s^2)): the rear axle's slip angle per lateral
     acceleration, `m l_f / (l C_r)`; `roll_gradient` (rad/(m/s^2)), `roll_frequency` (Hz), `roll_damping` (-) of the body over

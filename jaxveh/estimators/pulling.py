@@ -13,12 +13,19 @@ from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators import mass_and_grade
-from jaxveh.estimators.body_motion import SILENCE, SPEEDS, BodyMotion, away_from_zero, driven_share, hold
+from jaxveh.estimators.body_motion import (
+    SILENCE,
+    SLOWEST,
+    SPEEDS,
+    BodyMotion,
+    away_from_zero,
+    driven_share,
+    hold,
+)
 from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.lateral import motion_of
-from jaxveh.estimators.leaning import SLOWEST
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractSmoothable, Filtered, answer
 from jaxveh.estimators.misfit import Misfit, Roughness, learn_roughness, no_misfit, no_roughness
@@ -80,7 +87,8 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
     `grade_edge`). A climb rate from satellites measures the grade directly, `v_x sin(grade)`, with a delay (H. Bae, J. Ryu,
     J. Gerdes 2001). Made from a car's file it hears the wheels also where a log has a `v_x`: one that is estimated from them is
     late on hills. Brake torques are assumed correct within a share `brake_doubt`. (A. Vahidi et al. 2005 and P. Lingman, B.
-    Schmidtbauer 2003, with an accelerometer and its offset.)
+    Schmidtbauer 2003, with an accelerometer and its offset.) How noisy the log is, beyond the noises below, is learned: of
+    the measurements as their `Misfit`, of a_x as its `Roughness`.
 
     **Parameters**: of the car those of `AbstractDriveForce`, `mass` (kg), `rear_axle_to_cg`, `wheelbase` (m), `rear_compliance`,
     `pitch_gradient` (rad/(m/s^2)); of the belief `mass_spread` (-), `grade_spread` (rad), `a_x_offset`, `a_x_offset_spread`,

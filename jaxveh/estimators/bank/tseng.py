@@ -8,15 +8,11 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
-from jaxveh.estimators.body_motion import CRAWL, LATERAL, SILENCE, AbstractMotionMethod, arcsin_of, hold
+from jaxveh.estimators.body_motion import CRAWL, LATERAL, SILENCE, STEERING, AbstractMotionMethod, arcsin_of, hold
 from jaxveh.estimators.car_file import number_of
-from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import Lateral, lateral_of, motion_of
 from jaxveh.estimators.method import answer
 from jaxveh.io import CarSpecification
-
-STEERING = Need("steering_wheel", "rad")
-"""The steering wheel angle, which the method requires."""
 
 
 class TsengMemory(NamedTuple):
@@ -74,4 +70,4 @@ def tseng_of(car: CarSpecification, who: str) -> Tseng:
     return Tseng(motion_of(car), lateral_of(car, who), ratio=number_of(car, "steering_ratio", who, "-"))
 
 
-__all__ = ["STEERING", "Tseng", "tseng_of"]
+__all__ = ["Tseng", "tseng_of"]

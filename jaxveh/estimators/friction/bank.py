@@ -115,10 +115,9 @@ class FrictionBank(AbstractMethod):
     def first(self, t, values):
         bank = Bank(jnp.log(self._prior()), *self._start())
         along = None if self.along is None else self.along.start(t)
-        return self._said(
-            BankMemory(start_told(t, values), bank, along, jnp.zeros_like(t), no_misfit(2, t, first=1.0, seconds=0.5)),
-            0.0,
-        )
+        # It begins with the noises below, with which its numbers were chosen.
+        misfit = no_misfit(2, t, first=1.0, seconds=0.5)
+        return self._said(BankMemory(start_told(t, values), bank, along, jnp.zeros_like(t), misfit), 0.0)
 
     def next(self, memory, t, values):
         dt = jnp.clip(t - memory.told.t, 0.0, 1.0)

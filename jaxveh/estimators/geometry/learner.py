@@ -10,8 +10,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.bank.tseng import STEERING
-from jaxveh.estimators.body_motion import SILENCE, away_from_zero, hold
+from jaxveh.estimators.body_motion import SILENCE, STEERING, away_from_zero, hold
 from jaxveh.estimators.car_file import number_of
 from jaxveh.estimators.leaning import Leaning, leaning_filter
 from jaxveh.estimators.method import AbstractMethod, answer

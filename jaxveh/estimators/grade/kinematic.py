@@ -9,11 +9,11 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.body_motion import SILENCE, AbstractMotionMethod, arcsin_of, hold
+from jaxveh.estimators.body_motion import SILENCE, SLOWEST, AbstractMotionMethod, arcsin_of, hold
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractMethod, answer
-from jaxveh.estimators.pulling import ALONG, SLOWEST
+from jaxveh.estimators.pulling import ALONG
 from jaxveh.estimators.sideslip_methods.common import LONG_AGO
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY

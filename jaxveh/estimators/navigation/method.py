@@ -73,7 +73,8 @@ class Navigation(AbstractMethod):
 
     During an outage of the satellites the filter integrates the inertial unit; what is `known` follows from the standard
     deviations (`ENOUGH`). If the inertial unit has no measurement for longer than `cleaning.LONGEST_SILENCE`, velocity and yaw
-    are lost, and the next fix restarts them.
+    are lost, and the next fix restarts them. By how much the variances of the channels exceed those of the model is learned from
+    `info.innovation`, their `Misfit`.
     """
 
     model: StateSpace

@@ -66,7 +66,7 @@ class SlipAware(AbstractMethod):
     the filter integrates the accelerometer with the offset, gain and slope estimated before. While most wheels are at their limit
     and the force is beyond `bound_force` (m/s^2), two wheels that are faster than a braking car, or slower than a driven one,
     bound its speed. If wheels agree with the accelerometer's rate for `patience` (s) and are still not trusted, the speed's
-    process noise is increased until they are.
+    process noise is increased until they are. How noisy accelerometer, satellites and wheels are is learned, as their `Misfit`.
 
     **Delays** (s, of the production car): `a_x_delay` of the accelerometer and its low-pass filter, `wheel_delay` of wheel
     speeds, half a period included, `satellite_delay`. The answer is for the present time: the belief, extrapolated by its

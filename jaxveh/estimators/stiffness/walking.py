@@ -63,9 +63,9 @@ class WalkingStiffness(AbstractSmoothable):
     `course_delay` (s) against the inertial sensors; the filter adds its change since, the integral of a_y / v. Errors that
     could be mistaken for stiffness are states of their own: offsets, and the body's lean, which increases the measured
     acceleration. Where axles bend (`linear`, m/s^2 of lateral acceleration), measurements count less and less. On a slippery
-    road they bend sooner, and look soft.
+    road they bend sooner, and look soft. By how much the measurements are noisier than below is learned, their `Misfit`.
 
-    Without a course a stiffness is not known (`BLIND`).
+    Without a course a stiffness is not known (`BLIND`), and a noisy one counts for less.
 
     `spread` (-): standard deviation of ln C before the drive, `walk` (1/sqrt(s)): its random walk; `v_y_noise` (m/s^1.5),
     `yaw_noise` (rad/s^1.5); `a_y_noise` (m/s^2), `yaw_rate_noise` (rad/s), `course_noise` (m/s, lateral); `steer_noise`
