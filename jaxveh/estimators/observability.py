@@ -37,8 +37,11 @@ def predict_measurements(model: StateSpace, rows: Row, start) -> tuple[dict, dic
 def observe(model: StateSpace, recording: Recording, known_start: bool = True) -> Observability:
     """How well a recording with these inputs determines the model's parameters, at the prior's mean, without process noise.
 
-    Of the measurements only their presence is used, not their values. `known_start=False` adds the start states as unknowns
-    with the prior's spread. **Raises** `InputError` for a model without parameters.
+    Of the measurements only their presence is used, not their values: a planned drive will do. `known_start=False` adds the start
+    states as unknowns with the prior's spread.
+
+    **Returns** `diagnostics.Observability`: Cramer-Rao bounds by name, the direction about which the recording says least, and
+    `report()`, the same in words. Use float64. **Raises** `InputError` for a model without parameters.
     """
     check_flags(known_start=known_start)
     kit.check_model("observe", model)

@@ -100,8 +100,8 @@ def calibrate(
     progress: Progress = silent,
     uses: tuple[str, ...] = (),
 ) -> Calibration:
-    """Fit the rear axle, noise levels and sensor offsets of a car to one span of a log or to several together, by maximum
-    posterior of a filter.
+    """Fit the rear axle, noise levels and sensor offsets of a car to one span of a log or to several together, by the greatest
+    posterior density of a filter.
 
     A blind calibration (`uses=()`) reads only v_x, a_x, a_y and yaw_rate. With `uses=("v_y",)`, or `("sideslip",)`, that
     channel is a reference for the fit. Its weight is chosen by fitting on the first half of each span and validating on the

@@ -78,9 +78,9 @@ def state_space(
     - `minimum_speed` (m/s): below it all states of a car whose speed is the input `v_x` are held (`held_rows` returns where): a
       single track has no steady slip angle at standstill. The states of a car whose speed is a state are never held.
     - `report`: outputs of the car to show beside its states, such as `F_yf`; by default the sideslip of a car that has one.
-    - `solver`, `steps`: fixed steps between two rows, by default one of `statespace.RK4`: at 10 Hz it holds from 6 m/s on, at
-      25 Hz from 2.5 m/s on (`run` warns). If the car's wheels turn it is one of `statespace.StabilisedRK4`, which at 100 Hz
-      holds from 3 m/s on, four steps at standstill too. `input_path`: inputs `held` over a step or `linear`.
+    - `solver`, `steps` between two rows (one), by default `statespace.RK4`, short enough at 10 Hz from 6 m/s on, at 25 Hz from
+      2.5 m/s; for a car whose wheels turn `statespace.StabilisedRK4`, at 100 Hz from 3 m/s on, with four steps from standstill.
+      `run` warns where they are too long. `input_path`: inputs `held` from one row to the next, or `linear`.
     - A measured `yaw` or `course` may be given modulo a whole turn (within -pi to pi): their innovations wrap.
 
     The estimate's fields are the states, then `report`, then the parameters (`front_B`), in physical units.

@@ -81,28 +81,27 @@ def simulate(
     progress: Progress = silent,
     throw: bool = True,
 ) -> Recording:
-    """Drive `car` through `manoeuvre` and record it: rows at 0, dt, 2 dt, ... up to the manoeuvre's duration.
+    """Drive `car` through `manoeuvre` and record it: rows at 0, `dt`, 2 `dt`, ... (s) up to the manoeuvre's duration.
 
     **The drive**: `manoeuvre` is open-loop, or a driver who sees the car. If the car has an engine and brakes and the manoeuvre
     gives only a speed, a driver holds it (`manoeuvres.SpeedControl`). `road` (`jaxveh.roads`) has friction and slopes along the
     way (None: level). `start`: state fields that differ from straight running, by name (`{"yaw": 0.05}`), also the world position
-    `x`, `y`. `until`: an event that ends it (`simulation.standstill()`); later rows are cut off.
+    `x`, `y`. `until`: an event that ends the drive (`simulation.standstill()`); later rows are cut off.
 
-    **Channels** with a `SensorSet` (or without sensors): each measured channel by its name, with the sensors' noise, and the
-    car's inputs (`steer`, `v_x`, ...), exact unless the sensors measure them. With a `Suite` of devices (or one device): their
-    measurements at the instants when they arrive (rows at these instead of every `dt`; NaN where a device has none). In both
-    cases every output of the car as truth, `true.<name>`. `key` draws all randomness; without a key there is none.
+    **Returns** a `Recording`: `true.<name>`, every output of the car, and the channels. With a `SensorSet` (or without sensors)
+    these are what the sensors measure, with noise, and the car's inputs (`steer`, `v_x`, ...), exact unless measured. With a
+    `Suite` of devices (or one device) they are its measurements; the rows are the instants at which these arrive, instead of
+    every `dt`, with NaN where a device has none. `key` draws all randomness; without a key there is none.
 
-    **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened as the fastest motion
-    requires (a sensor's low-pass, the driver, a crawl). For a car whose wheels turn it takes `statespace.StabilisedRK4`, whose
-    steps of at most 2 ms hold the wheels' spins to standstill. Where steps would be too short, it takes Kvaerno's implicit
-    method. Under jit, vmap or grad the fastest motion is not known: the steps then hold whatever this kind of car can do, those
-    of RK4 at most 2.5 ms. "explicit" (RK4) and "implicit" are always obeyed: above 5 m/s "explicit" is enough for a car whose
-    wheels turn, and twice as fast. Outside jit a warning says where equal steps were too long for the motion. A diffrax solver
-    takes equal steps, or its own with a `stepsize_controller`. `adjoint`: diffrax's way to differentiate; the default serves
-    reverse mode, and also forward mode with equal steps and no event (otherwise `diffrax.ForwardMode()`). `progress` gets the
-    share done (single runs). All may be jitted, vmapped over keys, cars and manoeuvres, and differentiated. Outside jit a
-    steer of more than 1.6 rad gets a warning.
+    **Solver** "auto": RK4 with equal steps of at most `max_step` (s), shortened as the fastest motion requires (a sensor's
+    low-pass, the driver, a crawl). If the car's wheels turn: `statespace.StabilisedRK4`, whose steps of at most 2 ms hold down to
+    standstill. Where steps would be too short: Kvaerno's implicit method. Under jit, vmap or grad the fastest motion is unknown:
+    steps are then short enough for all that this kind of car can do, those of RK4 at most 2.5 ms. "explicit" (RK4) and "implicit"
+    are always obeyed: for a car whose wheels turn "explicit" is enough above 5 m/s, and twice as fast. A diffrax solver takes
+    equal steps, or its own with a `stepsize_controller`. Outside jit a warning says where equal steps were too long.
+    `adjoint`: diffrax's way to differentiate; the default serves reverse mode, and forward mode with equal steps and no event
+    (otherwise `diffrax.ForwardMode()`). `progress` gets the share done (single runs). All may be jitted, vmapped over keys, cars
+    and manoeuvres, and differentiated. Outside jit a steer of more than 1.6 rad gets a warning.
 
     **Raises** `InputError` for arguments out of range, sensors or an event of a wrong type, a manoeuvre without an input that the
     car needs, rows that coincide in the car's dtype; `FilterError`, with time, state and a remedy, if the motion does not stay

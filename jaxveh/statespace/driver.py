@@ -89,16 +89,18 @@ def run(
     """Run a filter over a recording in one `lax.scan`; compiled once for each filter, model structure and length.
 
     **Arguments**: `filter` (`Unscented()`, `ParticleFilter(1000)`, `AuxiliaryParticleFilter(1000)`, ...), `model` (a
-    `StateSpace`), `recording` with the model's inputs and measured channels (NaN: missing), `key` for particle filters. `keep`:
-    the parts that the estimate keeps for every row: "mean", "std", "info", or fields of it such as "info.nis". A thousand runs
-    spend most of their time on writing these: take `keep=()` if the log-likelihood is enough.
+    `StateSpace`), `recording` of T rows with the model's inputs and measured channels (NaN: missing), `key` for particle filters.
+    `keep`: the parts that the estimate keeps for every row: "mean", "std", "info", or fields of it such as "info.nis". A thousand
+    runs spend most of their time on writing these: take `keep=()` if the log-likelihood is enough.
+
+    **Returns** an `Estimate`: `mean.sideslip`, `std.sideslip`, ... (T,) in physical units, parameters, the log-likelihood.
 
     Gradients with respect to any array leaf of `model` work through `jax.grad` and `jax.value_and_grad`; steps are
     checkpointed. Inside jit the checks are skipped, and failures are left in `result`.
 
-    **Raises** `InputError` if model, filter and recording do not match; `FilterError` with step, time and
-    reason if the filter failed, and **warns** (`JaxvehWarning`) if it went on but has remarks on rows (`info.remark`), and if
-    rows are too far apart for the steps between them, unless `throw=False`.
+    **Raises** `InputError` if model, filter and recording do not match, and `FilterError` with step, time and reason if the
+    filter failed. **Warns** (`JaxvehWarning`) if it went on but has remarks on rows (`info.remark`), and if rows are too far
+    apart for the steps between them. `throw=False`: no `FilterError` and no warning.
     """
     check_flags(throw=throw)
     model = strong(model)

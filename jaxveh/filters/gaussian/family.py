@@ -49,9 +49,13 @@ class Extended(AbstractRuleFilter):
 
 
 class Unscented(AbstractRuleFilter):
-    """The unscented Kalman filter with scaled weights (Julier & Uhlmann 2004; Sarkka 2013, sec. 5.6).
+    """The unscented Kalman filter: 2n + 1 points carry a Gaussian of n states through any nonlinear model, to second order.
 
-    `alpha`, `beta`, `kappa` as in `numerics.sigma_points.unscented`; Julier & Uhlmann's first weights are alpha = 1, beta = 0.
+    The points are scaled by `alpha`, `beta`, `kappa` as in `numerics.sigma_points.unscented`. The defaults suit float32, too; a
+    small `alpha`, such as the usual 1e-3, does not. Julier & Uhlmann's first weights are alpha = 1, beta = 0. `form`: how the
+    covariance is kept, such as `SquareRoot()`. Source: Julier & Uhlmann 2004; Sarkka 2013, sec. 5.6.
+
+    **Raises** `InputError`, when it runs, if alpha^2 (n + kappa) is not positive.
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
