@@ -17,6 +17,16 @@ class System(NamedTuple):
     lacks: str = ""
 
 
+def system(what: str, where: str, *found: str, lacks: str = "") -> System:
+    """An entry of a paper's `SYSTEMS`: the fields of `System`, with as many names as there are."""
+    return System(what, where, found, lacks)
+
+
+def ways(quantity: str, *methods: str) -> tuple[str, ...]:
+    """The names of a quantity's methods below `jaxveh`."""
+    return tuple(f"estimators.{quantity}.METHODS[{name}]" for name in methods)
+
+
 def resolve_name(name: str) -> Any:
     """The object of a name below `jaxveh`: modules, attributes, `mapping[key]`. **Raises** `LookupError` if there is none."""
     plain, _, key = name.partition("[")
