@@ -212,7 +212,7 @@ def _watch_a_y(before: Watched, t, value, moves) -> tuple[Any, Watched]:
 
 def _behind(low_pass: LowPass, state, rate, dt):
     """The low-pass of an integral less the integral itself, after `dt` seconds in which it grows by `rate`."""
-    value, change = low_pass.step(state, 0.0 * rate, rate * dt, dt)
+    value, change = low_pass.step(state, jnp.zeros_like(rate), rate * dt, dt)
     return value - rate * dt, change
 
 

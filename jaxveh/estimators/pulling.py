@@ -135,7 +135,8 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
         }  # fmt: skip
         belief = belief_of(State, {"v_x": heard["v_x"], "a_x_bias": self.a_x_offset, "slip": self.slip}, stds, t)
         slides = self.sliding.start(t)
-        belief, misfit = self._measured(belief, slides.doubt, heard | {"rough": 0.0 * t}, values, no_misfit(4, t))
+        heard = heard | {"rough": jnp.zeros_like(t)}
+        belief, misfit = self._measured(belief, slides.doubt, heard, values, no_misfit(4, t))
         memory = PullingMemory(motion, slides, belief, misfit, no_roughness(values["a_x"]))
         return memory, self.say(memory)
 

@@ -182,7 +182,7 @@ def transition(system: RearAxle, t0, t1, x: RearAxleState, u) -> RearAxleState:
     dt = t1 - t0
     felt = system.specific_force(u.a_y, u.yaw_rate) - (u.turning - u.v_x * system.yaw_rate_offset)
     moving = x.v_y + dt * (felt - GRAVITY * system.bank * x.bank)
-    rolling = system.rolls(u.yaw_rate) + 0.0 * x.v_y
+    rolling = numerics.as_wide_as(system.rolls(u.yaw_rate), x.v_y)
     fade = lambda time: jnp.exp(-dt / time)
     slip_error = fade(system.slip_time) * x.slip_error
     steady = rolling - u.v_x * (numerics.tan(system.slip_angle(x, u)[0]) + system.slip_error * slip_error)

@@ -15,7 +15,7 @@ from jaxveh._core.bijectors import Interval
 from jaxveh._core.errors import InputError, check_at_least, check_positive
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, resolve
-from jaxveh.fitting.rig_problem import PULL, Descent, RigProblem, contact_of, descend, start_of
+from jaxveh.fitting.rig_problem import PULL, Descent, RigProblem, contact_of, descend, forces_of, start_of
 from jaxveh.fitting.rig_robust import TO_DEVIATION
 from jaxveh.fitting.rig_stages import Stage
 from jaxveh.io import RigTable
@@ -253,16 +253,13 @@ def fold_of(rig: RigTable, folds: int) -> np.ndarray:
     return (np.arange(rows) * 4 * folds // rows) % folds
 
 
+_forces = eqx.filter_jit(forces_of)
+
+
 @eqx.filter_jit
 def _descend(problem: RigProblem, limit, tolerance: float) -> Descent:
     """Steps from the law's coefficients: a block between two estimates of the noise by the host."""
     return descend(problem, problem.start(), None, tolerance, limit)
-
-
-@eqx.filter_jit
-def _forces(law, contact, channels, measured):
-    found = law.forces(contact)
-    return jnp.stack([jnp.asarray(getattr(found, name), measured.dtype) + 0 * measured[0] for name in channels])
 
 
 def leaf_of(law: AbstractTyre, name: str) -> Any:

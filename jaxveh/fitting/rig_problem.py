@@ -17,7 +17,7 @@ from jaxveh._core.bijectors import Real
 from jaxveh._core.parameter import Parameter, pick, put
 from jaxveh.fitting.levenberg_marquardt import LevenbergMarquardt, Quadratic
 from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units
-from jaxveh.numerics import on_cpu
+from jaxveh.numerics import as_wide_as, on_cpu
 from jaxveh.tyres import AbstractTyre, Contact
 
 PULL = 0.1
@@ -31,6 +31,12 @@ freedom."""
 
 BLOCK = 2000
 """Rows per block on a CPU; an accelerator takes all at once."""
+
+
+def forces_of(law: AbstractTyre, contact: Contact, channels: tuple[str, ...], measured: jax.Array) -> jax.Array:
+    """The channels (m, n) that a law gives at the rows of `contact`, in the precision of `measured` (m, n)."""
+    found, like = law.forces(contact), measured[0]
+    return jnp.stack([as_wide_as(jnp.asarray(getattr(found, name), like.dtype), like) for name in channels])
 
 
 class RigProblem(AbstractProblem):
@@ -94,9 +100,7 @@ class RigProblem(AbstractProblem):
 
     def forces(self, law: AbstractTyre):
         """The channels (m, n) that a law gives."""
-        found = law.forces(self.contact)
-        like = self.measured[0]
-        return jnp.stack([jnp.asarray(getattr(found, name), like.dtype) + 0 * like for name in self.channels])
+        return forces_of(law, self.contact, self.channels, self.measured)
 
     def bend(self, residual):
         """Residuals in standard deviations, reduced beyond `KINK` if the fit is robust, and the slope of this function."""

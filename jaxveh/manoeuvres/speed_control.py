@@ -83,7 +83,7 @@ class SpeedControl(AbstractDriver):
         return None if self.driver.fastest_rate is None else jnp.maximum(own, self.driver.fastest_rate)
 
     def start(self, t: Any, motion: Motion) -> Any:
-        return driver_state(self.state_names)(*self.driver.start(t, motion), 0.0 * motion.v_x)
+        return driver_state(self.state_names)(*self.driver.start(t, motion), jnp.zeros_like(motion.v_x))
 
     def inputs(self, t: Any, motion: Motion, state: Any) -> Any:
         """The `PedalInputs`; if the driver gives angles of other wheels (`steer_rear`, `steer_fl` ...), these are included."""
@@ -92,7 +92,7 @@ class SpeedControl(AbstractDriver):
         torque, edge = self.mass * self.wheel_radius * wanted + own, self.mass * self.wheel_radius * _EDGE
         pedals = smooth_ramp(torque, edge), smooth_ramp(-torque, edge)
         angles = {name: getattr(u, name) for name in kit.STEER_UNITS if name != "steer" and hasattr(u, name)}
-        v_x_rate = u.v_x_rate if hasattr(u, "v_x_rate") else 0.0 * u.v_x
+        v_x_rate = u.v_x_rate if hasattr(u, "v_x_rate") else jnp.zeros_like(u.v_x)
         known = PedalInputs(u.steer, u.v_x, v_x_rate, *pedals)
         return record("PedalInputs", known._asdict() | angles) if angles else known
 

@@ -266,7 +266,7 @@ def innovation_charts(points: InnovationPoints) -> Any:
     over_lag = _small_chart(f"correlation of innovations of {words} [1]", "lag [s]")
     lag, band = (values.astype(np.float32) for values in (points.lag, points.band))
     over_lag.varea(lag, -band, band, color=CYCLE[2], alpha=0.2)
-    over_lag.segment(lag, 0.0 * lag, lag, points.correlation.astype(np.float32), color=CYCLE[0])
+    over_lag.segment(lag, np.zeros_like(lag), lag, points.correlation.astype(np.float32), color=CYCLE[0])
     return column(over_time, over_lag, sizing_mode="stretch_width")
 
 

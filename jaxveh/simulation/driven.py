@@ -100,7 +100,7 @@ def adapt_inputs(vehicle: AbstractVehicle, given: Any, moves: Motion) -> Any:
         elif name in vehicles_kit.wheel_names("torque") and "drive_torque" in given._fields:
             found[name] = 0.25 * (given.drive_torque - given.brake_torque * vehicles_kit.travel_direction(moves.v_x))
         elif name in vehicles_kit.STEER_UNITS and "steer" in given._fields:
-            found[name] = given.steer if name in ("steer_fl", "steer_fr") else 0.0 * given.steer
+            found[name] = given.steer if name in ("steer_fl", "steer_fr") else jnp.zeros_like(given.steer)
     return record("DriverInputs", {**given._asdict(), **found}) if found else given
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax.numpy as jnp
+
 from jaxveh import numerics
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_static
 from jaxveh.tyres.slip import length, practical, share
@@ -41,10 +43,12 @@ class FrictionEllipse(AbstractTyre):
         s = length(s_x, s_y)
 
         def along(slip):
-            return self.along.forces(contact._replace(slip_ratio=slip, slip_angle=0.0 * slip, lateral_slip=None)).F_x
+            at = contact._replace(slip_ratio=slip, slip_angle=jnp.zeros_like(slip), lateral_slip=None)
+            return self.along.forces(at).F_x
 
         def across(slip):
-            at = contact._replace(slip_ratio=0.0 * slip, slip_angle=numerics.arctan(slip), lateral_slip=slip)
+            at = contact._replace(slip_ratio=jnp.zeros_like(slip), slip_angle=numerics.arctan(slip), lateral_slip=slip)
             return self.across.forces(at).F_y
 
-        return Forces(F_x=along(0.0 * s) + share(along, s_x, s), F_y=across(0.0 * s) + share(across, s_y, s))
+        none = jnp.zeros_like(s)
+        return Forces(F_x=along(none) + share(along, s_x, s), F_y=across(none) + share(across, s_y, s))

@@ -283,8 +283,9 @@ def _combined_findings(tyre: MFTyre) -> Iterator[PropertyFinding]:
     force = lambda a, k: _forces(
         tyre, Contact(slip_angle=jnp.asarray(a), slip_ratio=jnp.asarray(k), load=jnp.asarray(load))
     )
+    none = np.zeros_like(angle)
     brakes, turns = force(angle, -ratio), force(-angle, -ratio)
-    alone_x, alone_y = force(0 * angle, -ratio).F_x, force(angle, 0 * ratio).F_y - force(-angle, 0 * ratio).F_y
+    alone_x, alone_y = force(none, -ratio).F_x, force(angle, none).F_y - force(-angle, none).F_y
     # The force that slip ratio adds to F_y is the same at both slip angles, so that their difference does not contain it.
     for about, name, weight, slip in (
         ("RBX1 to RHX1", "F_x", _share(brakes.F_x, alone_x, load), np.degrees(angle)),

@@ -54,7 +54,7 @@ class Similarity(AbstractTyre):
 
         def curve(slip):
             angle = numerics.arctan(slip)
-            at = contact._replace(slip_angle=angle, lateral_slip=slip, slip_ratio=0.0 * slip)
+            at = contact._replace(slip_angle=angle, lateral_slip=slip, slip_ratio=jnp.zeros_like(slip))
             return self.tyre.forces(at._replace(load=self.reference_load, friction=1.0)).F_y
 
         if self.slip_stiffness_ratio is None:

@@ -70,7 +70,7 @@ class Commanded(AbstractVehicle):
     def start(self, t, u, **values):
         """Straight running; `v_x` is the speed (m/s), 0 unless given."""
         check_names("start", values, self.state_type._fields)
-        zero = 0.0 * u.steer_rate
+        zero = jnp.zeros_like(u.steer_rate)
         own = [jnp.asarray(values.get(name, zero), jnp.result_type(zero)) for name in OWN]
         given = record("Given", {"steer": own[0], "v_x": own[1], **dict.fromkeys(KNOWN[2:], zero)})
         return self.state_type(*own, *self.vehicle.start(t, given, **{k: v for k, v in values.items() if k not in OWN}))

@@ -1,11 +1,17 @@
 """Numbers beside arrays."""
 
+import ast
+from pathlib import Path
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import jaxveh
 from jaxveh import numerics
+
+ROOT = Path(jaxveh.__file__).parent
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -24,3 +30,26 @@ def test_arrays_have_their_common_shape():
 def test_what_is_not_finite_beside_it_is_told_and_has_no_slope():
     np.testing.assert_array_equal(numerics.as_wide_as(1.0, jnp.asarray([2.0, np.nan, np.inf])), [1.0, np.nan, np.nan])
     assert jax.grad(numerics.as_wide_as, argnums=(0, 1))(2.0, 3.0) == (1.0, 0.0)
+
+
+def test_several_arrays_have_their_common_shape_and_precision():
+    found = numerics.as_wide_as(0.5, jnp.ones(2, np.float32), jnp.ones((3, 1), np.float32))
+    assert found.dtype == np.float32
+    np.testing.assert_array_equal(found, np.full((3, 2), 0.5, np.float32))
+
+
+def is_product_with_zero(node):
+    """Whether a node of a syntax tree is `0.0 * x` or `x * 0`."""
+    product = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult)
+    return product and any(isinstance(side, ast.Constant) and side.value == 0 for side in (node.left, node.right))
+
+
+def test_no_other_module_multiplies_by_zero_for_a_shape():
+    """A product with zero says neither what it is for nor that a NaN goes through: `jnp.zeros_like` and `as_wide_as` do."""
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for path in ROOT.rglob("*.py")
+        if any(map(is_product_with_zero, ast.walk(ast.parse(path.read_text("utf-8")))))
+    }
+    later = {"estimators/misfit.py", "estimators/stiffness/least_squares.py", "estimators/stiffness/walking.py"}
+    assert found - later == {"numerics/widths.py"}

@@ -156,7 +156,7 @@ class AlongEvidence(eqx.Module):
             memory.variance + dt * jnp.square(self.slip_noise) / 100.0, jnp.square(self.radius_noise)
         )
         # Errors of a slip are correlated over half a second.
-        rough = jnp.square(0.003 + 0.0 * variance) * 0.5 / jnp.maximum(dt, 1e-3)
+        rough = 0.003**2 * 0.5 / jnp.maximum(dt, 1e-3)
         gain = jnp.where(rolls, variance / (variance + rough), 0.0)
         return memory.offset + gain * (shown - memory.offset), (1.0 - gain) * variance
 

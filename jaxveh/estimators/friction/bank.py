@@ -146,8 +146,7 @@ class FrictionBank(AbstractMethod):
     def _start(self):
         zero = jnp.zeros_like(self.frictions)
         spread = jnp.stack([
-            0.5 + 0.0 * self.stiffness_spread, 0.1 + 0.0 * self.stiffness_spread, self.stiffness_spread,
-            self.stiffness_spread, 0.15 + 0.0 * self.stiffness_spread, self.steer_noise, GRAVITY * self.car.roll_gradient,
+            0.5, 0.1, self.stiffness_spread, self.stiffness_spread, 0.15, self.steer_noise, GRAVITY * self.car.roll_gradient,
             self.offset_spread,
         ])  # fmt: skip
         lean = GRAVITY * self.car.roll_gradient + zero
@@ -208,8 +207,7 @@ class FrictionBank(AbstractMethod):
         """A linearly implicit trapezoidal step: stable at any speed."""
         soft = self.stiffness_spread * jnp.sqrt(2.0 / self.stiffness_time)
         walks = jnp.stack([
-            self.v_y_noise, self.yaw_noise, soft, soft, 0.005 + 0.0 * dt,
-            self.steer_noise * jnp.sqrt(2.0 / STEER_TIME), 0.001 + 0.0 * dt, 1e-5 + 0.0 * dt,
+            self.v_y_noise, self.yaw_noise, soft, soft, 0.005, self.steer_noise * jnp.sqrt(2.0 / STEER_TIME), 0.001, 1e-5,
         ])  # fmt: skip
         noise = jnp.diag(jnp.square(walks) * dt)
         same = jnp.ones_like(dt)

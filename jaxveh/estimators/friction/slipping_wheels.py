@@ -84,7 +84,7 @@ class WheelObserver(AbstractWheelMethod):
         load = seen.load * self.slips.nominal()
         if self.law is None:
             curves = self.slips.curves(self.stiffness_ratio)
-            return jnp.stack([mu * c.force(seen.slip[k], 1.0 + 0.0 * mu, seen.load[k]) for k, c in enumerate(curves)])
+            return jnp.stack([mu * c.force(seen.slip[k], 1.0, seen.load[k]) for k, c in enumerate(curves)])
         v_x = wheels.told.v_x
         contact = Contact(slip_ratio=seen.slip, load=load, friction=mu, speed=v_x, slip_speed=v_x)
         return self.law.forces(contact, self.law.start(contact)).F_x

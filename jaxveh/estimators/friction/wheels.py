@@ -161,7 +161,7 @@ class SlipSlope(AbstractWheelMethod):
 
     def _spread(self):
         usual = self._usual()
-        return jnp.diag(jnp.square(jnp.stack([0.5 * usual, 0.02 + 0.0 * usual, 0.02 + 0.0 * usual])))
+        return jnp.diag(jnp.square(jnp.stack([0.5 * usual, 0.02, 0.02])))
 
     def say(self, memory):
         usual = self._usual()

@@ -77,10 +77,10 @@ def network_weights(model: Any) -> tuple[jax.Array, ...]:
 
 def _around(tyre: AbstractTyre, load: Any, key: jax.Array, units: int) -> ResidualTyre:
     load = jnp.asarray(load)
-    one = jnp.ones((), load.dtype)
     if isinstance(tyre, AbstractDynamicTyre):
         tyres.need_static("with_residual_tyres", tyre)
-    stiffness = cornering_stiffness(tyre, Contact(0.0 * one, load=load, speed=20.0 * one))
+    at_rest, speed = jnp.asarray(0.0, load.dtype), jnp.asarray(20.0, load.dtype)
+    stiffness = cornering_stiffness(tyre, Contact(at_rest, load=load, speed=speed))
     # The bends of the hidden units are spread over the range of slips.
     bias = jnp.linspace(0.0, REACH, units, dtype=load.dtype)
     inner = 1.0 + 0.3 * jax.random.normal(key, (units,), load.dtype)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractMethod, Answer, Filtered
@@ -88,7 +89,7 @@ def observation(system: LinearSingleTrack, t, x: Track, u) -> Seen:
 def report(system: LinearSingleTrack, t, x: Track, u) -> TrackReport:
     """The outputs of the filter."""
     del system, t
-    v_x, sideslip = u.v_x + 0.0 * x.sideslip, x.sideslip + x.slip_error
+    v_x, sideslip = numerics.as_wide_as(u.v_x, x.sideslip), x.sideslip + x.slip_error
     return TrackReport(v_x, v_x * sideslip, x.yaw, sideslip, x.yaw_rate, x.bias_yaw_rate, x.steer_offset)
 
 

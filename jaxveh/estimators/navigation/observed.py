@@ -56,7 +56,7 @@ def observation(system: Navigator, t, x, u) -> Any:
         seen[f"{STANDS}_roll"] = x.lean - x.lean_gradient * f_y
         seen[f"{STANDS}_pitch"] = x.dip + system.dip_gradient * f_x
     channels = channels_of(parts)
-    return record("NavigationOutputs", {name: seen[name] + 0.0 * x.v_x for name in channels})
+    return record("NavigationOutputs", {name: numerics.as_wide_as(seen[name], x.v_x) for name in channels})
 
 
 def velocity_then(system: Navigator, x, u, past: str) -> tuple[Any, Any]:
@@ -140,7 +140,7 @@ def axle_slip(system: Navigator, x, u) -> tuple[Any, Any, Any]:
     share = force / jnp.maximum(load, 0.2 * GRAVITY * system.mass * a / length)
     stiffness = system.stiffness * (jnp.exp(x.stiffening) if system.parts.adapts else 1.0)
     if system.parts.axle == "linear":
-        angle, slope = share / stiffness, 1.0 / stiffness + 0.0 * share
+        angle, slope = share / stiffness, numerics.as_wide_as(1.0 / stiffness, share)
     else:
         used = numerics.smooth_clip(share / system.grip, -SATURATED, SATURATED, BEND)
         # Slightly above zero, because a power of zero has no derivative.
@@ -200,7 +200,8 @@ def noise(system: Navigator, t, x, u) -> dict[str, Any]:
         # Near saturation the law gives less and less information on the slip angle.
         uncertain = numerics.hypot(system.slip_noise / numerics.sqrt(u.step), force * slope)
         std[BALANCE] = 0.02 * shared + jnp.abs(x.v_x) * (1.0 + jnp.square(numerics.tan(angle))) * uncertain
-    return {name: std[name] * numerics.sqrt(getattr(u, misfit_of(name))) + 0.0 * x.v_x for name in channels_of(parts)}
+    misfits = {name: numerics.sqrt(getattr(u, misfit_of(name))) for name in channels_of(parts)}
+    return {name: numerics.as_wide_as(std[name] * misfit, x.v_x) for name, misfit in misfits.items()}
 
 
 def report(system: Navigator, t, x, u) -> Any:
@@ -234,4 +235,4 @@ def report(system: Navigator, t, x, u) -> Any:
         }
     if system.parts.camera:
         shown |= {"lane_offset": x.lane_offset, "lane_heading": x.lane_heading}
-    return record_type("NavigationReport", shown)(*[value + 0.0 * x.v_x for value in shown.values()])
+    return record_type("NavigationReport", shown)(*[numerics.as_wide_as(value, x.v_x) for value in shown.values()])

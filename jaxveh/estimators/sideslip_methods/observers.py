@@ -143,7 +143,7 @@ class ErrorLinearising(AbstractPlaced):
         least = LEAST_SLOPE * (plain[0] + plain[1]) / car.mass / jnp.maximum(row.u.v_x, model.system.slowest)
         # The channels are yaw rate, which is the second state, and a_y.
         slope, turning = -jnp.maximum(-H[1, 0], least), H[1, 1]
-        inverse = jnp.stack([jnp.stack([-turning / slope, 1.0 / slope]), jnp.stack([1.0 + 0.0 * slope, 0.0 * slope])])
+        inverse = jnp.stack([jnp.stack([-turning / slope, 1.0 / slope]), jnp.asarray([1.0, 0.0], slope.dtype)])
         determinant = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
         back = jnp.stack([jnp.stack([F[1, 1], -F[0, 1]]), jnp.stack([-F[1, 0], F[0, 0]])]) / determinant
         return (jnp.eye(2, dtype=F.dtype) - z[:, None] * back) @ inverse
@@ -219,7 +219,7 @@ class RearForce(eqx.Module):
 def rear_derivatives(system: RearForce, t, x: LateralState, u) -> LateralState:
     """`dv_y/dt = a_y - v_x r`, `J dr/dt = a m a_y - (a + b) F_r`: the front axle's force is `m a_y - F_r`."""
     car: Any = system.car
-    straight = record_type("Inputs", ("steer", "v_x"))(0.0 * u.v_x, u.v_x)
+    straight = record_type("Inputs", ("steer", "v_x"))(jnp.zeros_like(u.v_x), u.v_x)
     F_r = car.outputs(t, full_state(car, x), straight).F_yr
     moment = car.front_axle_to_cg * car.mass * u.a_y - car.wheelbase * F_r
     return LateralState(u.a_y - u.v_x * x.yaw_rate, moment / car.yaw_inertia)

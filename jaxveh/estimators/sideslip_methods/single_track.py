@@ -112,10 +112,10 @@ def rolling_below(system: Lateral, moved, u):
     """The state `moved`, or below `slowest` that of a car whose wheels roll without slip."""
     car: Any = system.car
     # Only lateral velocity and yaw rate are replaced; other states (roll) are left as they are.
-    none = 0.0 * moved.yaw_rate
-    sideslip = car.rear_axle_to_cg / car.wheelbase * u.steer + none
+    sideslip = numerics.as_wide_as(car.rear_axle_to_cg / car.wheelbase * u.steer, moved.yaw_rate)
     aside = {"sideslip": sideslip} if "sideslip" in moved._fields else {"v_y": u.v_x * sideslip}
-    rolling = moved._replace(yaw_rate=u.v_x * u.steer / car.wheelbase + none, **aside)
+    yaw_rate = numerics.as_wide_as(u.v_x * u.steer / car.wheelbase, moved.yaw_rate)
+    rolling = moved._replace(yaw_rate=yaw_rate, **aside)
     return jax.tree.map(lambda a, b: jnp.where(u.v_x >= system.slowest, a, b), moved, rolling)
 
 

@@ -108,7 +108,7 @@ class SlipAware(AbstractMethod):
         mean = SpeedState(v_x, zero, zero, zero, zero + self.gain, *[zero] * 7, sinking=zero + self.sinking)
         std = SpeedState(
             jnp.where(count > 0, 0.3 + 0.03 * jnp.abs(v_x), 30.0), 3.0, s.slope, s.offset, s.gain,
-            s.common_radius, *[0.0 * s.radius] * 4, *[s.softness] * 2, sinking=s.sinking,
+            s.common_radius, *[0.0] * 4, *[s.softness] * 2, sinking=s.sinking,
         )  # fmt: skip
         stack = lambda state: jnp.stack([jnp.asarray(one, t.dtype) for one in state])
         belief = Belief(stack(mean), jnp.diag(jnp.square(stack(std))) + own_radii(s.radius))
@@ -116,7 +116,7 @@ class SlipAware(AbstractMethod):
         ones = jnp.ones_like(wheels)
         memory = Memory(
             belief, t, dict.fromkeys(HELD, zero), dict.fromkeys(HELD, never), jnp.where(there, wheels, v_x), t * ones, ones,
-            0.0 * ones, zero, t, no_misfit(3, t), (jnp.where(there, wheels, v_x),) * 2,
+            jnp.zeros_like(ones), zero, t, no_misfit(3, t), (jnp.where(there, wheels, v_x),) * 2,
         )  # fmt: skip
         return memory, self._answer(memory)
 
@@ -176,11 +176,10 @@ class SlipAware(AbstractMethod):
         lost = memory.t - memory.lost > self.patience
         wander = s.speed_walk + jnp.where(lost, 1.0, 0.0)
         soft = s.softness * numerics.sqrt(2.0 / s.softness_time)
-        none = 0.0 * s.gain
         slope_walk = jnp.where(felt, s.slope_walk, 0.0)
         # The walk of each wheel's own radius is added below.
         walks = [
-            wander, s.force_walk, slope_walk, s.offset_walk, none, 0.5 * s.radius_walk, *[none] * 4, soft, soft, none,
+            wander, s.force_walk, slope_walk, s.offset_walk, 0.0, 0.5 * s.radius_walk, *[0.0] * 4, soft, soft, 0.0,
         ]  # fmt: skip
         noise = jnp.diag(jnp.square(jnp.stack(walks))) + own_radii(s.radius_walk)
         return predict(memory.belief, move, step * noise)
@@ -282,7 +281,8 @@ class SlipAware(AbstractMethod):
         slow = slow + jnp.square(at_limit)
         # Where one wheel locks or spins, the forces of the others are unknown.
         slow = slow + jnp.square(self.spreads.other_slip * jnp.max(suspicion) * belief.mean[0])
-        both = innovations(belief, expect, jnp.tile(wheels, 2), jnp.concatenate([white + slow, white + 0.0 * slow]))
+        variances = jnp.concatenate([white + slow, numerics.as_wide_as(white, slow)])
+        both = innovations(belief, expect, jnp.tile(wheels, 2), variances)
         found, rolling = (Innovation(*[part[rows] for part in both]) for rows in (slice(0, 4), slice(4, 8)))
         now = self._gates(found, said, white + slow, there) * steady
         trusted = jnp.minimum(memory.trust + step / self.memory * (1.0 - memory.trust), 1.0)

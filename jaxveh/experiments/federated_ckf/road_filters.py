@@ -103,7 +103,7 @@ def _guess(study, drive):
     mean, _ = _follow(model, rows_of(study, drive))
     same = jnp.ones_like(mean[:, 0])
     friction = jnp.broadcast_to(ROAD_START.friction * same[:, None], (same.shape[0], 4))
-    return RoadFound(mean[:, 0], mean[:, 1], ROAD_START.mass * same, friction, 0.0 * friction)
+    return RoadFound(mean[:, 0], mean[:, 1], ROAD_START.mass * same, friction, jnp.zeros_like(friction))
 
 
 def _told(study, drive):
@@ -115,7 +115,8 @@ def _told(study, drive):
     where = lambda model: _body(model.system)
     model = with_parameters(states, where, _body_spreads(study), study.walk)
     mean, _ = _follow(model, rows._replace(u=u))
-    return RoadFound(mean[:, 0], mean[:, 1], jnp.exp(mean[:, 3]), drive.true_friction, 0.0 * drive.true_friction)
+    mass, friction = jnp.exp(mean[:, 3]), drive.true_friction
+    return RoadFound(mean[:, 0], mean[:, 1], mass, friction, jnp.zeros_like(friction))
 
 
 def road_metrics(study: Study, found: RoadFound, drive: Drive) -> dict[str, Any]:

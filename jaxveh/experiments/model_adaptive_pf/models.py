@@ -125,7 +125,7 @@ def spinning_model(study: Study, car: SevenDOF, start_speed) -> StateSpace:
     spins = [name for name in car.state_type._fields if name.startswith("omega")]
     turning = start_speed / study.wheel_radius
     own = {"v_x": 2.0 * study.v_x, **SPREAD, **dict.fromkeys(spins, 2.0 * study.v_x / study.wheel_radius)}
-    mean = record_type("SpinningState", own)(start_speed, *[0.0 * start_speed] * 2, *[turning] * len(spins))
+    mean = record_type("SpinningState", own)(start_speed, *[jnp.zeros_like(start_speed)] * 2, *[turning] * len(spins))
     return StateSpace(
         system=car, transition=Propagate(_rates, RK4(), 2), observation=_spinning_observation, report=_spinning_report,
         process_noise=Continuous(Gaussian(body | dict.fromkeys(spins, study.spin_noise))),
@@ -146,7 +146,7 @@ def heavy_dynamics(study: Study, car: TwoTrack3DOF, start_speed) -> StateSpace:
 
 def prior(study: Study, start_speed, lags: tuple[str, ...] = ()) -> Prior:
     """Straight running at the first measured speed."""
-    zero = 0.0 * start_speed
+    zero = jnp.zeros_like(start_speed)
     spread = {"v_x": 2.0 * study.v_x, **SPREAD, **dict.fromkeys(lags, DEFLECTION)}
     kind = record_type("MovedState", spread) if lags else BodyState
     return Prior(kind(start_speed, *[zero] * (len(spread) - 1)), spread)
@@ -181,7 +181,7 @@ def spinning_rows_of(study: Study, drive: Drive) -> Row:
 
 def _whole(car: TwoTrack3DOF | SevenDOF, x: Any):
     """The car's state with a yaw of zero, on which nothing depends."""
-    return car.state_type(**{"yaw": 0.0 * x.yaw_rate, **x._asdict()})
+    return car.state_type(**{"yaw": jnp.zeros_like(x.yaw_rate), **x._asdict()})
 
 
 def _rates(car: TwoTrack3DOF | SevenDOF, t, x, u):

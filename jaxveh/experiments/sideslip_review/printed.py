@@ -50,7 +50,7 @@ def steady_turn(speed: float = SPEED, steer: float = STEER) -> tuple[float, floa
     u = record("Inputs", {"steer": np.float64(steer), "v_x": np.float64(speed)})
 
     def rates(x):
-        found = car.derivatives(0.0, car.state_type(x[0], 0.0 * x[0], x[1]), u)
+        found = car.derivatives(0.0, car.state_type(x[0], jnp.zeros_like(x[0]), x[1]), u)
         return jnp.stack([found.sideslip, found.yaw_rate])
 
     zero = jnp.zeros(2)

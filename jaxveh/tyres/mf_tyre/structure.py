@@ -106,8 +106,7 @@ class Structure(AbstractSection):
 
     def loaded_radius(self, load, camber, wheel: Wheel, dp_i, F_x, F_y):
         """The loaded radius, at which `carried_load` is the load, and the vertical deflection of version 6.2, m."""
-        like = wheel.speed * 0 + load * 0 + F_x * 0 + F_y * 0 + camber * 0
-        first = self.UNLOADED_RADIUS + like
+        first = numerics.as_wide_as(self.UNLOADED_RADIUS, wheel.speed, load, F_x, F_y, camber)
 
         def missing(radius, given):
             structure, load, *rest = given
@@ -116,7 +115,8 @@ class Structure(AbstractSection):
         rest = (camber, wheel, dp_i, F_x, F_y)
         # Starting values and tolerance are those of the reference evaluator: its tolerance of 1e-6 of the nominal load shows in
         # the result.
-        radius = numerics.secant(missing, (self, load + like, *rest), 0.95 * first, first, 1e-6 * self.FNOMIN)
+        given = (self, numerics.as_wide_as(load, first), *rest)
+        radius = numerics.secant(missing, given, 0.95 * first, first, 1e-6 * self.FNOMIN)
         return radius, self.carried_load(radius, *rest)[1]
 
     def carried_load(self, radius, camber, wheel: Wheel, dp_i, F_x, F_y):
