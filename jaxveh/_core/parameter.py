@@ -28,6 +28,11 @@ It is always called with the object beside it in the arguments: in `state_space(
 UNNAMED = {"named": False}
 """Metadata of a field that only contains the object with the parameters, such as a model's system: names omit it."""
 
+_ADVICE = {
+    False: "A parameter that is known exactly should not be estimated: leave it out of `where`.",
+    True: "It is relative to the value: a parameter at zero needs a `scale`. Leave one that is known exactly out of `where`.",
+}
+
 
 def parameter(unit: str = "-", domain: AbstractBijector | None = None, scale: float | None = None, **kwargs):
     """Declare a field of an `eqx.Module` as a parameter: converted to a strong float array, with unit and domain.
@@ -297,9 +302,3 @@ def prior_spread(parameters: tuple[Parameter, ...], values, relative, what: str 
             f"{what} spread of {p.name}", spread, advice=_ADVICE[p.scale is None and isinstance(p.domain, Real)]
         )
     return spreads
-
-
-_ADVICE = {
-    False: "A parameter that is known exactly should not be estimated: leave it out of `where`.",
-    True: "It is relative to the value: a parameter at zero needs a `scale`. Leave one that is known exactly out of `where`.",
-}

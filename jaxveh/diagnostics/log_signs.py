@@ -27,6 +27,12 @@ _LATERAL = {
 }
 _LONGITUDINAL = {1 / 3.6: ("v_x", "km/h"), 0.44704: ("v_x", "mph"), 1 / GRAVITY: ("a_x", "g")}
 
+_SAME = (0.8, 1.25)
+"""Ratios of the wheels' speed to v_x that count as 1."""
+
+_ARMS = ((1.35, 1.35), (2.5, 2.5))
+"""Two distances of a car and of a truck in m: from the centre of gravity to the rear axle, and yaw inertia over m a."""
+
 
 def check_wheel_speeds(log: LogView) -> list[LogFinding]:
     """Check whether v_x agrees with the wheel speeds."""
@@ -40,9 +46,6 @@ def check_wheel_speeds(log: LogView) -> list[LogFinding]:
         if abs(np.log(ratio / factor)) < np.log(1.15):
             return [LogFinding("error", "v_x", f"{story}: v_x looks like {unit}. Set it in the channel map.", values)]
     return [LogFinding("warning", "v_x", f"{story}, which should be 1: the wheels in rad/s or km/h?", values)]
-
-
-_SAME = (0.8, 1.25)
 
 
 def _wheels_over_speed(log: LogView) -> float | None:
@@ -191,10 +194,6 @@ def _if_slow(log: LogView, found: LogFinding) -> LogFinding:
     return found._replace(
         severity="warning", message=f"{found.message} Quick turns look alike, and there are no slow ones."
     )
-
-
-_ARMS = ((1.35, 1.35), (2.5, 2.5))
-"""Two distances of a car and of a truck in m: from the centre of gravity to the rear axle, and yaw inertia over m a."""
 
 
 def _arms(car: CarSpecification) -> tuple[float, float]:

@@ -61,6 +61,9 @@ OF_THE_CAR = 0.03
 """Relative standard deviation of the mass by errors of the torques and of the wheel radius in the car's file, which no drive
 shows: a force that is 3 % too large in all rows is a mass that is 3 % too large."""
 
+JOINT = (*ALONG, *[need._replace(optional=False) for need in TORQUES])
+"""The channels of the filter of `mass_and_grade`."""
+
 
 class PullingMemory(NamedTuple):
     """The last measurements, whether the car slides, and the belief; how noisy the log is: the `misfit` of wheels, satellites,
@@ -319,10 +322,6 @@ class Held(AbstractCleaning):
             "a_x": jnp.where(silent, jnp.nan, felt),
         }
         return (motion, drive, brake), heard | made
-
-
-JOINT = (*ALONG, *[need._replace(optional=False) for need in TORQUES])
-"""The channels of the filter of `mass_and_grade`."""
 
 
 def joint_filter(car: CarSpecification, shown: tuple[str, ...]) -> Filtered:

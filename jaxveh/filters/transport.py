@@ -13,6 +13,9 @@ from jaxveh._core.errors import check, check_whole
 from jaxveh._core.result import Result, code
 from jaxveh.filters.choosing import AbstractResampling, PlainDraw, Resampled, log_of
 
+NARROWEST = 1e-2
+"""The least ratio of the weighted particles' standard deviation to that of all particles for which a plan is made."""
+
 
 class Transport(AbstractResampling):
     """Resampling in which every particle moves: optimal transport from the weights to equal weights, smoothed by entropy.
@@ -73,9 +76,6 @@ def _spread(fields: Any, weights: Any) -> Any:
     mean = jnp.sum(weights * fields, axis=1, keepdims=True)
     return numerics.sqrt(jnp.sum(weights * jnp.square(fields - mean), axis=1, keepdims=True))
 
-
-NARROWEST = 1e-2
-"""The least ratio of the weighted particles' standard deviation to that of all particles for which a plan is made."""
 
 RELAXATION = 1.5
 """The over-relaxation of Sinkhorn's iterations once the smoothing has fallen (A. Thibault et al. 2021): a third fewer

@@ -30,6 +30,13 @@ REDUCTIONS = {
 }  # fmt: skip
 """By name, the primitive that combines two entries, and its function."""
 
+_ON_NUMBERS: dict[str, Callable] = {
+    "add": np.add, "sub": np.subtract, "mul": np.multiply, "neg": np.negative, "max": np.maximum, "min": np.minimum,
+    "eq": np.equal, "ne": np.not_equal, "lt": np.less, "le": np.less_equal, "gt": np.greater, "ge": np.greater_equal,
+    "and": np.bitwise_and, "or": np.bitwise_or, "not": np.invert, "sqrt": np.sqrt, "square": np.square, "abs": np.abs,
+    "is_finite": np.isfinite, "sign": np.sign,
+}  # fmt: skip
+
 
 def elementwise(primitive: Any, params: dict[str, Any], operands: list[Entries], out: Any) -> Entries:
     """An elementwise primitive, entry by entry."""
@@ -73,14 +80,6 @@ def _simplified(name: str, operands: list[Any], dtype: Any) -> Any:
     if name == "select_n" and known[0]:
         return operands[1 + int(operands[0])]
     return None
-
-
-_ON_NUMBERS: dict[str, Callable] = {
-    "add": np.add, "sub": np.subtract, "mul": np.multiply, "neg": np.negative, "max": np.maximum, "min": np.minimum,
-    "eq": np.equal, "ne": np.not_equal, "lt": np.less, "le": np.less_equal, "gt": np.greater, "ge": np.greater_equal,
-    "and": np.bitwise_and, "or": np.bitwise_or, "not": np.invert, "sqrt": np.sqrt, "square": np.square, "abs": np.abs,
-    "is_finite": np.isfinite, "sign": np.sign,
-}  # fmt: skip
 
 
 def reduction(name: str, axes: tuple[int, ...], operand: Entries, out: Any) -> Entries:

@@ -19,6 +19,9 @@ from jaxveh.statespace import cast
 from jaxveh.vehicles import AbstractVehicle, Motion, Steered
 from jaxveh.vehicles import kit as vehicles_kit
 
+LEAST = 1e-6
+"""Replaces a drag or rolling resistance of zero, for which the driver need not compensate."""
+
 
 class DrivenState(NamedTuple):
     """The state of the car with its sensors, and the state of its driver."""
@@ -211,7 +214,3 @@ def car_itself(vehicle: Any) -> Any:
     while hasattr(vehicle, "vehicle"):
         vehicle = vehicle.vehicle
     return vehicle
-
-
-LEAST = 1e-6
-"""Replaces a drag or rolling resistance of zero, for which the driver need not compensate."""

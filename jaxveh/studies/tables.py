@@ -24,6 +24,8 @@ from jaxveh.sweeps import Axis, Comparison, Swept, Table, compare
 MOST_POINTS = 40
 """Most rows of the table of every point: larger designs get only the table by axis."""
 
+COMPARED = ("ratio", "95 % interval over seeds", "smaller in")
+
 
 def tables(found: Swept, values: Iterable[str] = ()) -> list[Table]:
     """Every table of a sweep for these values (default: all that are one number per run)."""
@@ -82,9 +84,6 @@ def _against_nothing(found: Swept, errors: list[str]) -> Table:
             one, other = (np.asarray(found[value], float)[..., whole] for value in (name, nothing))
             rows.append((name, *_comparison(one, other)))
     return Table("Against doing nothing (baseline), on the same drives", ("error", *COMPARED), rows)
-
-
-COMPARED = ("ratio", "95 % interval over seeds", "smaller in")
 
 
 def _pairs(found: Swept, errors: list[str], axis: Axis) -> Table:

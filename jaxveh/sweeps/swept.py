@@ -21,6 +21,9 @@ from jaxveh._core.shown import Kept, above
 from jaxveh.sweeps.design import Axis, Design
 from jaxveh.sweeps.paired import Comparison, compare
 
+SEED, OWN = "seed", "_of_"
+"""The dimension of runs, and the middle part of the names of dimensions of a run's own value."""
+
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Swept(Kept):
@@ -141,10 +144,6 @@ class Swept(Kept):
         return compare(
             self.at(name, **{axis: a}), self.at(name, **{axis: b}), axis=len(self.design.axes) - 1, level=level
         )
-
-
-SEED, OWN = "seed", "_of_"
-"""The dimension of runs, and the middle part of the names of dimensions of a run's own value."""
 
 
 def _plain(label: Any) -> Any:

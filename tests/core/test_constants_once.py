@@ -1,4 +1,5 @@
-"""A constant stands once: two modules that give the same name to the same value, or the same names to a tuple, mean the same."""
+"""A constant stands once: two modules that give the same name to the same value, or the same names to a tuple, mean the same.
+And it stands above what uses it, so that a module reads from top to bottom."""
 
 import ast
 from collections import defaultdict
@@ -56,3 +57,33 @@ def test_a_constant_stands_once():
 
 def test_every_exemption_is_needed():
     assert {name for found in twice() for name, _ in found} >= set(OTHER_MEANINGS)
+
+
+def names_in(node):
+    return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+
+
+def constants_below_their_use(tree):
+    """The constants that stand below a function or class of their module with their name in it. One that is made of functions
+    or classes of the module, or of such constants, cannot stand above them."""
+    used, made = set(), set()
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            used |= names_in(node)
+            made.add(node.name)
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            named = {name for target in targets for name in names_in(target) if name.isupper()}
+            if node.value is not None and names_in(node.value) & made:
+                made |= named
+            else:
+                yield from named & used
+
+
+def test_a_constant_stands_above_what_uses_it():
+    found = {
+        path.relative_to(ROOT).as_posix(): names
+        for path in ROOT.rglob("*.py")
+        if (names := sorted(constants_below_their_use(ast.parse(path.read_text("utf-8")))))
+    }
+    assert not found, found

@@ -33,6 +33,27 @@ Steering = record_type("SteeringFit", ("ratio", "offset", "understeer"))
 Turning = record_type("TurningFit", ("stiffness", "inertia"))
 """Relative errors of the front axle's cornering stiffness and of the yaw inertia."""
 
+LONG = 60.0
+"""s: time constant of the averaged square of the steer."""
+
+START = 2.0
+"""s: time until the low-pass filters have forgotten their initial values."""
+
+SLOWEST = 3.0
+"""m/s: nothing is learned below this speed."""
+
+QUICK = 5.0
+"""m/s: little is learned below this speed."""
+
+LINEAR = 2.0
+"""m/s^2: above this acceleration the tyres are not linear, and little is learned."""
+
+CALM = 0.15
+"""rad/s^2: above this yaw acceleration little is learned about the steering."""
+
+STAYS = 10.0
+"""s: correlation time that is assumed for a constant error."""
+
 
 class LearnerMemory(NamedTuple):
     """The memory of the filter of roll and bank, `leaning`; the steering `wheel` angle (rad); the steer with the delay of the yaw
@@ -224,28 +245,6 @@ def _within(change: Any, most: Any) -> Any:
     """A change, smoothly limited to `most`; small changes are hardly affected."""
     bound = jnp.where(most > 0, most, 1.0)
     return jnp.where(most > 0, bound * jnp.tanh(change / bound), 0.0)
-
-
-LONG = 60.0
-"""s: time constant of the averaged square of the steer."""
-
-START = 2.0
-"""s: time until the low-pass filters have forgotten their initial values."""
-
-SLOWEST = 3.0
-"""m/s: nothing is learned below this speed."""
-
-QUICK = 5.0
-"""m/s: little is learned below this speed."""
-
-LINEAR = 2.0
-"""m/s^2: above this acceleration the tyres are not linear, and little is learned."""
-
-CALM = 0.15
-"""rad/s^2: above this yaw acceleration little is learned about the steering."""
-
-STAYS = 10.0
-"""s: correlation time that is assumed for a constant error."""
 
 
 def learner_of(car: CarSpecification, who: str) -> Learner:

@@ -19,6 +19,15 @@ from jaxveh.estimators.pulling import JOINT, OF_THE_CAR, WIDEST_MASS
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
+RESIDUAL = 0.05
+"""m/s^2: least standard deviation of the residual, force over mass less acceleration."""
+
+START = 2.5
+"""s: time until the low-pass filters have forgotten their initial values."""
+
+SLOW = 4.0
+"""s: slower changes are attributed to the grade."""
+
 
 class Pull(AbstractDriveForce):
     """The longitudinal force on a car, and its `pitch_gradient` (rad/(m/s^2))."""
@@ -102,20 +111,9 @@ class AbstractRatio(AbstractMotionMethod):
         return memory, answer({"mass": mass}, {"mass": std}, known=std < WIDEST_MASS * mass)
 
 
-RESIDUAL = 0.05
-"""m/s^2: least standard deviation of the residual, force over mass less acceleration."""
-
-
 def beyond(rate: Any, gate: Any) -> Any:
     """1 for an acceleration above the gate (m/s^2), 0 below, with a smooth transition within a tenth of it."""
     return numerics.smooth_step(0.5 + 5.0 * (jnp.abs(rate) / gate - 1.0))
-
-
-START = 2.5
-"""s: time until the low-pass filters have forgotten their initial values."""
-
-SLOW = 4.0
-"""s: slower changes are attributed to the grade."""
 
 
 class Gated(AbstractRatio):

@@ -23,6 +23,9 @@ USUAL_TRACK = 1.5
 USUAL_HEIGHT = 0.55
 """m: height of the centre of gravity, for a file without it; it only corrects the axle load for acceleration."""
 
+SHAPES = 1.0, 8.0
+"""Bounds of the curve's shape parameter."""
+
 
 def navigation(parts: Parts) -> Callable[[CarSpecification], Navigation]:
     """A function that makes a navigation with these `parts` from a car's file."""
@@ -93,10 +96,6 @@ def _shape(tyre: AxleTyre) -> float:
     x = _crossing(lambda x: formula(x) - BEND, 0.0, 50.0)
     stretch = max(tyre.C * x / BEND, 1.0 + 1e-3)
     return _crossing(lambda shape: stretch - (1.0 - BEND**shape) ** (-1.0 / shape), *SHAPES)
-
-
-SHAPES = 1.0, 8.0
-"""Bounds of the curve's shape parameter."""
 
 
 def _crossing(rising: Callable[[float], float], low: float, high: float) -> float:

@@ -31,6 +31,9 @@ GROUPS = (("a_x", "a_y"), ("yaw_rate",), WHEELS)
 SHARED = (CHANNELS, ("a_y", "yaw_rate"))
 """The paper's Z_1 and Z_2, with the wheel speeds in the first: the first contains all of the second."""
 
+BLOCKS = (State._fields, ("mass", "yaw_inertia", "front_axle_to_cg"), ("friction",))
+"""The quantities of the three estimators."""
+
 
 class Found(NamedTuple):
     """Estimates over time, (T,): speeds (m/s), yaw rate (rad/s), and (T, 4) `parameters` in physical units.
@@ -91,10 +94,6 @@ def with_shares() -> Contestant:
     """The redesign with N. Carlson's shares of information instead of a common prediction."""
     what = "as redesigned, but each local filter has a third of the information, and its points lie sqrt(3) as far out"
     return Contestant(_joint(filters.Federated(filters.Cubature(), GROUPS)), what)
-
-
-BLOCKS = (State._fields, ("mass", "yaw_inertia", "front_axle_to_cg"), ("friction",))
-"""The quantities of the three estimators."""
 
 
 def _guess(study: Study, start: Any, drive: Drive) -> Found:

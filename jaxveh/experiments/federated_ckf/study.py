@@ -19,6 +19,9 @@ from jaxveh.experiments.federated_ckf.settings import OTHER_START, PARAMETERS, P
 from jaxveh.sweeps import IN_MEMORY, Stores
 from jaxveh.vehicles import sets
 
+OTHER_NOISE = (0.01, 0.01, 1e-3)
+"""The noises of the greatest likelihood on drives of other keys with other tyres, within a factor of three."""
+
 
 class Case(NamedTuple):
     """A drive and a first guess (`start`), with a `bias` (rad/s) of the yaw rate for a while, or on the tyres of a
@@ -38,10 +41,6 @@ def cases(study: Study) -> dict[str, Case]:
         "fault": Case(OTHER_START, bias=study.bias),
         "other tyres": Case(OTHER_START, magic_formula=True, noise=OTHER_NOISE),
     }
-
-
-OTHER_NOISE = (0.01, 0.01, 1e-3)
-"""The noises of the greatest likelihood on drives of other keys with other tyres, within a factor of three."""
 
 
 ALIKE = 6

@@ -30,6 +30,15 @@ from jaxveh.vehicles import TwoTrack3DOF
 
 Run = Callable[[Study, TwoTrack3DOF, Drive, Any], Estimate]
 
+PLAIN = "PF"
+ADAPTIVE = "PF, wavelet and mixture"
+REDESIGNED = "PF, redesigned"
+CUBATURE = "CKF"
+STUDENT = "Student-t CKF, wavelet"
+ROBUST = "robust CKF, wavelet"
+TOLD = "CKF, told the noise"
+"""A reference and no competitor: the gain if a filter is told what the others have to learn."""
+
 
 class Contestant(NamedTuple):
     """`run(study, car, drive, key) -> Estimate`, with the car of the filter's model; and a description, `what`."""
@@ -78,15 +87,6 @@ def contestants(study: Study, lags: bool = True) -> dict[str, Contestant]:
         ),
     }
 
-
-PLAIN = "PF"
-ADAPTIVE = "PF, wavelet and mixture"
-REDESIGNED = "PF, redesigned"
-CUBATURE = "CKF"
-STUDENT = "Student-t CKF, wavelet"
-ROBUST = "robust CKF, wavelet"
-TOLD = "CKF, told the noise"
-"""A reference and no competitor: the gain if a filter is told what the others have to learn."""
 
 JUDGED = (PLAIN, ADAPTIVE, REDESIGNED, CUBATURE, STUDENT, ROBUST)
 """The estimators of the criteria: the plain filter, those asked about, and those made later."""

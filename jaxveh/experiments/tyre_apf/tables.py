@@ -17,6 +17,9 @@ from jaxveh.experiments.tyre_apf.tracks import tracks_table
 from jaxveh.experiments.tyre_apf.variants import variants_table
 from jaxveh.sweeps import ConfidenceInterval, Swept, Table
 
+ERROR_TITLE = "Eight parameters by the sensors' noise: RMSE in prior standard deviations, median [quartiles]"
+AHEAD_TITLE = ERROR_TITLE + "; the APF looks ahead with the process noise"
+
 
 def tables(result: Reproduction) -> list[Table]:
     """All tables."""
@@ -102,10 +105,6 @@ def _saturated_table(result: Reproduction) -> Table:
 
 
 HEADS = tuple(f"{level.yaw_rate:g} rad/s, {level.a_y:g} m/s^2" for level in LEVELS)
-
-
-ERROR_TITLE = "Eight parameters by the sensors' noise: RMSE in prior standard deviations, median [quartiles]"
-AHEAD_TITLE = ERROR_TITLE + "; the APF looks ahead with the process noise"
 
 
 def _error_table(found: Sharpness, title: str = ERROR_TITLE) -> Table:

@@ -38,6 +38,11 @@ CHAPTERS = {
 LATEST = 100
 """Rows: the largest delay or lead of an estimate that is looked for."""
 
+STEP = 0.01
+"""s: between rows, of the fastest device."""
+
+LEANS = ("true.sideslip", "true.roll")
+
 
 class ChaptersRaced(NamedTuple):
     """`drives`: (scenarios, seeds, T) by channel; `found`: by quantity, method and shown name, values by metric, (scenarios,
@@ -183,17 +188,12 @@ def _score(shown: list[str], said: dict[str, Any], drive: dict) -> dict[str, Any
     return {name: {metric: values[i] for metric, values in found.items()} for i, name in enumerate(shown)}
 
 
-STEP = 0.01
-"""s: between rows, of the fastest device."""
-
 WARM_UP = 5.0
 """s at the beginning that are not scored."""
 
 
 LOST = np.radians(20.0)
 """rad of sideslip, or of roll: from there on a car has spun or tipped over, and the rest of the drive is not scored."""
-
-LEANS = ("true.sideslip", "true.roll")
 
 
 def held_rows(drive: Mapping[str, Any]) -> Any:
