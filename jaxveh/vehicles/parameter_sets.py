@@ -26,8 +26,8 @@ def passenger_car() -> SingleTrack:
 
     **Erratum**: the paper prints the two distances in exchanged order (`passenger_car_as_printed`). The front axle would then
     need a friction coefficient of 1.5, and the car would spin in a double lane change at 25 m/s with 2 degrees of steer.
-    Swapped, as here, it is an ordinary understeering car. Its cornering stiffnesses are in kN/rad, and are not the printed 117
-    and 144.
+    Swapped, as here, it is an ordinary understeering car. The paper also prints cornering stiffnesses of 117 and 144; its
+    coefficients give the two above.
     """
     return _printed_car(front_axle_to_cg=0.96, rear_axle_to_cg=1.59)
 
