@@ -24,11 +24,12 @@ class Exchange(AbstractMethod):
         found = kit.follow("whole", whole, log)             # the log needs no v_x
         found["sideslip_sideslip"], found.std.speed_v_x
 
-    The review proposes to divide the task in this way (Chen, Gao, Xu 2013, conclusion 2), and paper 002 does so. `gives`: the
-    source of each such channel, as method and output name. A method reads the output of this row if its source comes earlier in
-    `methods`, and that of the row before if it comes later; two methods may read each other. The channel counts as not measured
-    (NaN) in the first row, where there is no earlier output, and wherever the output is not finite. Standard deviations are not
-    passed on: the channel counts as a measurement with the noise that the reading method expects.
+    The review proposes to divide the task in this way (Chen, Gao, Xu 2013, conclusion 2), and the paper of federated-ckf does so.
+
+    `gives`: the source of each such channel, as method and output name. A method reads the output of this row if its source comes
+    earlier in `methods`, and that of the row before if it comes later; two methods may read each other. The channel counts as not
+    measured (NaN) in the first row, where there is no earlier output, and wherever the output is not finite. Standard deviations
+    are not passed on: the channel counts as a measurement with the noise that the reading method expects.
 
     An answer contains all outputs, named `<method>_<name>`; its result is the first code that is not 0.
 

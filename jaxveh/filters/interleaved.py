@@ -61,8 +61,8 @@ def interleave(
         found.mean["mass"].mass
 
     Three small filters cost less than one with all states, and each can be written, tuned and switched off by itself
-    (paper 002). In return, each filter takes the results of the others as exact, so that standard deviations are too
-    small, and correlations between states of different filters are lost. The joint filter
+    (as in the paper of federated-ckf). In return, each filter takes the results of the others as exact, so that standard
+    deviations are too small, and correlations between states of different filters are lost. The joint filter
     (`statespace.with_parameters`) is better wherever it is stable; `Consider` and `Dual` lie between the two.
 
     **Arguments**: `turns` by name; `recording`: each model takes its own inputs and channels from it; or `Row`s that

@@ -152,10 +152,14 @@ def test_the_catalogue_is_what_the_methods_declare():
 CATALOGUE = Path(__file__).parents[2] / "notebooks" / "catalogues" / "estimators.md"
 HEAD = """# Quantities and their methods
 
-What `jaxveh estimate --what` and `jaxveh.estimators` know. Channels in brackets may be missing; `*` stands for the four wheels;
-the last column names the optional keys of the car's file that a method cannot do without. Bold is what we recommend.
+All quantities of `jaxveh estimate --what` and `jaxveh.estimators`. Bold is the method that we recommend.
 
-This page is made of what the methods declare; a test holds it to that.
+- *from*: section, equation and reference in the review of Chen, Gao & Xu (2013); `mass-grade-aukf` is the paper on mass and grade
+  ([papers](papers.md)).
+- *reads*: the channels; those in brackets may be missing, `*` stands for the four wheels.
+- *asks for*: optional keys of the car's file that the method cannot do without.
+
+This page is generated from the methods' declarations.
 
 """
 

@@ -48,6 +48,7 @@ NOT_OURS = {
     r"\bc_?W\b": "the drag coefficient is c_d",
     r"\bcurved (model|transition|observation)": "nonlinear",
     r"\blog lacks\b": "say what is missing from the log, and what it has",
+    r"\bpapers? 0\d\d\b": "a paper has a name, that of `jaxveh reproduce`",
 }
 
 

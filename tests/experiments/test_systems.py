@@ -16,9 +16,8 @@ from jaxveh.experiments.systems import resolve_name, systems_page
 PAGE = Path(__file__).parents[2] / "notebooks" / "catalogues" / "papers.md"
 HEAD = """# The papers' systems
 
-What each of the five papers has, models, methods, tables, figures and claims, and which names below `jaxveh` have it. Where
-nothing is named the last column says why. This page is made of what the experiments declare; a test holds it to that, and that
-each name exists.
+The models, methods, tables, figures and claims of the five papers, and the names in `jaxveh` that have them. If nothing is named,
+the last column says why. This page is generated from the declarations of the experiments.
 
 """
 TITLES = {

@@ -1,4 +1,4 @@
-"""The slope of the road along the car, positive uphill: section 3.1.2.3 of the review (Chen, Gao, Xu 2013), and paper 004's.
+"""The slope of the road along the car, positive uphill: section 3.1.2.3 of Chen, Gao & Xu 2013, and mass-grade-aukf.
 
 An accelerometer measures `d v_x/dt - v_y r + g sin(grade)`. The part that the speed's rate does not explain is the grade and the
 accelerometer's offset: 0.1 m/s^2 is 0.58 degrees. Torques at the wheels distinguish the two, and so does a vertical speed from
@@ -18,7 +18,7 @@ SHOWN = {"grade": "rad"}
 
 METHODS = {
     "kinematic": MethodOfCar(
-        kinematic_of, "the measured acceleration less the rate of the wheels' speed", "paper 004 [12]"
+        kinematic_of, "the measured acceleration less the rate of the wheels' speed", "mass-grade-aukf [12]"
     ),
     "satellite": MethodOfCar(
         satellite_of, "the measured acceleration less the rate of the satellites' speed", "3.1.2.3 [128]"
@@ -31,7 +31,7 @@ METHODS = {
     "joint": MethodOfCar(
         lambda car: joint_filter(car, ("grade",)),
         "the filter of mass, grade and offset of `mass_and_grade`",
-        "paper 004",
+        "mass-grade-aukf",
     ),
     "filter": MethodOfCar(
         lambda car: pulling_filter(car, NAME),

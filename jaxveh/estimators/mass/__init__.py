@@ -1,4 +1,4 @@
-"""The mass of a car: refs [8], [11], [12], [13] of paper 004, and section 3.1.2.4 of the review (Chen, Gao, Xu 2013).
+"""The mass of a car: refs [8], [11], [12], [13] of mass-grade-aukf, and section 3.1.2.4 of Chen, Gao & Xu 2013.
 
 The mass follows from force over acceleration. Its accuracy is that of the torque at the wheels and of the wheels' radius, and it
 is only observable where pedals move. `known` says whether the standard deviation is within 5 per cent, of which 3 are for errors
@@ -21,33 +21,33 @@ METHODS = {
     "gated": MethodOfCar(
         lambda car: ratio_of(Gated, car, NAME),
         "least squares of force over acceleration, known only after some seconds above 0.6 m/s^2",
-        "paper 004 [8]",
+        "mass-grade-aukf [8]",
     ),
     "high_pass": MethodOfCar(
         lambda car: ratio_of(HighPass, car, NAME),
         "least squares of the fast parts of force and of the speed's rate, because grades are slow; known only where "
         "pedals have moved much",
-        "paper 004 [11]",
+        "mass-grade-aukf [11]",
     ),
     "forgetting": MethodOfCar(
         forgetting_factors,
         "recursive least squares of mass and grade, with faster forgetting of the grade",
-        "paper 004 [13], 3.1.2.3 [127]",
+        "mass-grade-aukf [13], 3.1.2.3 [127]",
     ),
     "kinematic_grade": MethodOfCar(
         lambda car: ratio_of(KinematicGrade, car, NAME),
         "the grade from accelerometer and speed, then least squares; known only after some seconds of acceleration",
-        "paper 004 [12]",
+        "mass-grade-aukf [12]",
     ),
     "joint": MethodOfCar(
         lambda car: joint_filter(car, ("mass",)),
         "the filter of mass, grade and offset of `mass_and_grade`",
-        "paper 004",
+        "mass-grade-aukf",
     ),
     "filter": MethodOfCar(
         lambda car: pulling_filter(car, NAME),
         "one filter of grade, mass and the accelerometer's offset, with bends, slip and a grade that changes with distance",
-        "paper 004 [9, 10]",
+        "mass-grade-aukf [9, 10]",
     ),
 }
 

@@ -128,7 +128,7 @@ class Gated(AbstractRatio):
 
 
 class KinematicGrade(AbstractRatio):
-    """The grade from accelerometer and speed, then `F = m (d v_x/dt + g sin(grade) + g f_r)` (ref. [12] of paper 004)."""
+    """The grade from accelerometer and speed, then `F = m (d v_x/dt + g sin(grade) + g f_r)` (ref. [12] of mass-grade-aukf)."""
 
     def pair(self, heard, force, memory):
         pitch = self.pull.pitch_gradient
@@ -138,7 +138,10 @@ class KinematicGrade(AbstractRatio):
 
 
 class HighPass(AbstractRatio):
-    """Changes of the force faster than `SLOW` against those of the speed's rate (ref. [11] of paper 004): grades are slower."""
+    """Changes of the force faster than `SLOW` against those of the speed's rate, since grades are slower.
+
+    Source: ref. [11] of mass-grade-aukf.
+    """
 
     lasting: jax.Array = positive("s", default=1.0)
 

@@ -1,4 +1,4 @@
-"""Every model, method and figure of paper 002 (Ji, Li, Fan), and its place in this package."""
+"""Every model, method and figure of federated-ckf (Ji, Li, Fan), and its place in this package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every model, method, table and figure of paper 004, and its place in this package."""
+"""Every model, method, table and figure of mass-grade-aukf, and its place in this package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every model, method, table and figure of paper 001 (Qin et al. 2014), and its place in this package."""
+"""Every model, method, table and figure of model-adaptive-pf (Qin et al. 2014), and its place in this package."""
 
 from __future__ import annotations
 

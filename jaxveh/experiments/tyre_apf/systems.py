@@ -1,4 +1,4 @@
-"""Every model, method, table and figure of paper 000 (Bao, Sabbioni et al. 2015), and its place in this package."""
+"""Every model, method, table and figure of tyre-apf (Bao, Sabbioni et al. 2015), and its place in this package."""
 
 from __future__ import annotations
 
