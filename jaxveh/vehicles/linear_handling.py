@@ -192,6 +192,7 @@ class LinearSingleTrack(AbstractOneTrack):
         return 1.0 - self.steering.axle_gains(speed)[1]
 
     def _steadiness(self, speed):
+        """L + K v^2, m: the steer over the path's curvature; zero at the critical speed."""
         return self.wheelbase + self.understeer_gradient * speed * speed
 
 

@@ -25,7 +25,10 @@ RATES = {"yaw_inertia": 10.0, "front_axle_to_cg": 0.005, "steer_offset": 2e-4, "
 """Largest rates of the reported values, in units per second."""
 
 NARROW = {"yaw_inertia": 0.1, "front_axle_to_cg": 0.05, "steer_offset": 6e-4, "steering_ratio": 0.025}
-"""Standard deviations below which a number is known: relative to the start for inertia and ratio, otherwise in its unit."""
+"""Standard deviations below which a number is known: relative to the start for those of `RELATIVE`, otherwise in its unit."""
+
+RELATIVE = ("yaw_inertia", "steering_ratio")
+"""The parameters whose standard deviation counts relative to their start."""
 
 Steering = record_type("SteeringFit", ("ratio", "offset", "understeer"))
 """Relative error of the ratio, offset at the road wheels (rad), understeer gradient less that of the start (rad/(m/s^2))."""
@@ -140,65 +143,81 @@ class Learner(AbstractMethod):
         return self._next(memory, leaning, said, t - before, values)
 
     def _next(self, memory, leaning, said, dt, values):
-        wheel = hold(values["steering_wheel"], memory.wheel)
-        motion, believed = leaning.motion, said.mean
-        share = dt / (self.time + dt)
-        turn_now = motion.yaw_rate - believed.yaw_rate_bias
-        force_now = motion.a_y - believed.a_y_bias - GRAVITY * believed.body_roll
-        slow = lambda before, now: before + share * (now - before)
-        late = memory.late + dt / (self.late + dt) * (wheel / self.steering_ratio - memory.late)
-        steer, turn = slow(memory.steer, late), slow(memory.turn, turn_now)
-        force, v_y = slow(memory.force, force_now), slow(memory.v_y, believed.v_y)
-        rate = (turn_now - turn) / self.time
+        motion = leaning.motion
         silent = jnp.maximum(motion.silence, motion.speed_silence) > 0.5 * SILENCE
         there = ~silent & ~jnp.isnan(values["steering_wheel"]) & (memory.age > START) & (motion.v_x > SLOWEST)
         fast = away_from_zero(motion.v_x)
+        wheel = hold(values["steering_wheel"], memory.wheel)
+        memory, rate = self._low_passed(memory._replace(leaning=leaning, wheel=wheel), said.mean, fast, dt)
         # Rows count gradually less in hard turns and at low speed.
-        doubt = 1.0 + jnp.square(jnp.square(force / LINEAR)) + jnp.square(jnp.square(QUICK / fast))
+        doubt = 1.0 + jnp.square(jnp.square(memory.force / LINEAR)) + jnp.square(jnp.square(QUICK / fast))
         lasting = doubt * 2.0 * self.lasting / jnp.maximum(dt, 1e-3)
+        steering = self._fit_steering(memory, rate, fast, lasting, there)
+        turning = self._fit_turning(memory, steering, rate, fast, lasting, there)
+        heading = said.std.yaw_rate_bias / jnp.maximum(fast, QUICK)
+        # Share of the steering amplitude that is lost in the play.
+        swing = self.play / numerics.sqrt(memory.square + jnp.square(0.1 * self.play))
+        means, stds = self._numbers(steering, turning, heading, jnp.minimum(swing, self.ratio_spread))
+        most = {name: RATES[name] * jnp.where(there, dt, 0.0) for name in UNITS}
+        shown = {name: memory.shown[name] + _within(means[name] - memory.shown[name], most[name]) for name in UNITS}
+        narrow = NARROW | {name: NARROW[name] * getattr(self, name) for name in RELATIVE}
+        known = {
+            name: (stds[name] < narrow[name]) & (jnp.abs(means[name] - shown[name]) < narrow[name]) for name in UNITS
+        }
+        memory = memory._replace(steering=steering, turning=turning, shown=shown, age=memory.age + dt)
+        return memory, answer(shown, stds, known)
+
+    def _low_passed(self, memory: LearnerMemory, believed: Any, fast: Any, dt: Any) -> tuple[LearnerMemory, Any]:
+        """The memory with the low-passed signals of this row, and the yaw acceleration (rad/s^2). `believed`: the means of the
+        filter of roll and bank; `fast`: the speed away from zero (m/s)."""
+        motion, share = memory.leaning.motion, dt / (self.time + dt)
+        slow = lambda before, now: before + share * (now - before)
+        turn_now = motion.yaw_rate - believed.yaw_rate_bias
+        force_now = motion.a_y - believed.a_y_bias - GRAVITY * believed.body_roll
+        late = memory.late + dt / (self.late + dt) * (memory.wheel / self.steering_ratio - memory.late)
+        turn = slow(memory.turn, turn_now)
         curve = self.wheelbase * turn / fast
-        square = memory.square + dt / (LONG + dt) * (jnp.square(curve) - memory.square)
-        start = self._understeer() * force - self.yaw_inertia * self._place_slope() / self.mass * rate
-        off = lambda x: steer - x.offset - (1.0 + x.ratio) * (curve + start + x.understeer * force)
-        calm = 1.0 + jnp.square(jnp.square(rate / CALM))
-        steering = correct(
-            memory.steering, Measurement(off, jnp.square(self.steer_error) * lasting * calm, there), Steering
+        after = memory._replace(
+            late=late,
+            steer=slow(memory.steer, late),
+            turn=turn,
+            force=slow(memory.force, force_now),
+            v_y=slow(memory.v_y, believed.v_y),
+            square=memory.square + dt / (LONG + dt) * (jnp.square(curve) - memory.square),
         )
+        return after, (turn_now - turn) / self.time
+
+    def _fit_steering(self, now: LearnerMemory, rate: Any, fast: Any, lasting: Any, there: Any) -> Belief:
+        """The fit of ratio, offset and understeer after a row with these low-passed signals. `lasting`: the factor on a row's
+        variance, since errors of neighbouring rows are alike (-); `there`: whether the row counts."""
+        curve = self.wheelbase * now.turn / fast
+        start = self._understeer() * now.force - self.yaw_inertia * self._place_slope() / self.mass * rate
+        off = lambda x: now.steer - x.offset - (1.0 + x.ratio) * (curve + start + x.understeer * now.force)
+        calm = 1.0 + jnp.square(jnp.square(rate / CALM))
+        seen = Measurement(off, jnp.square(self.steer_error) * lasting * calm, there)
+        return correct(now.steering, seen, Steering)
+
+    def _fit_turning(
+        self, now: LearnerMemory, steering: Belief, rate: Any, fast: Any, lasting: Any, there: Any
+    ) -> Belief:
+        """The fit of front stiffness and yaw inertia after a row, given the fit of the `steering`."""
         fit = Steering(*steering.mean)
-        front = (steer - fit.offset) / (1.0 + fit.ratio) - (v_y + self.front_axle_to_cg * turn) / fast
+        front = (now.steer - fit.offset) / (1.0 + fit.ratio) - (now.v_y + self.front_axle_to_cg * now.turn) / fast
         scale = self.mass * GRAVITY * self.wheelbase
         rear = self.wheelbase - self.front_axle_to_cg
 
         def moment(x):
             tyres = self.front_stiffness * (1.0 + x.stiffness) * self.wheelbase * front
-            return (self.mass * rear * force - tyres + self.yaw_inertia * (1.0 + x.inertia) * rate) / scale
+            return (self.mass * rear * now.force - tyres + self.yaw_inertia * (1.0 + x.inertia) * rate) / scale
 
         # Errors of ratio and position are constant: no number of rows averages them out.
         wrong = numerics.hypot(
-            steer * numerics.sqrt(steering.covariance[0, 0]), numerics.hypot(self.place_spread * turn / fast, 1e-4)
+            now.steer * numerics.sqrt(steering.covariance[0, 0]),
+            numerics.hypot(self.place_spread * now.turn / fast, 1e-4),
         )
         stays = jnp.square(self.front_stiffness * self.wheelbase / scale * wrong) * (STAYS / self.lasting)
-        turning = correct(
-            memory.turning, Measurement(moment, (jnp.square(self.moment_error) + stays) * lasting, there), Turning
-        )
-        heading = said.std.yaw_rate_bias / jnp.maximum(fast, QUICK)
-        # Share of the steering amplitude that is lost in the play.
-        swing = self.play / numerics.sqrt(square + jnp.square(0.1 * self.play))
-        means, stds = self._numbers(steering, turning, heading, jnp.minimum(swing, self.ratio_spread))
-        most = {name: RATES[name] * jnp.where(there, dt, 0.0) for name in UNITS}
-        shown = {name: memory.shown[name] + _within(means[name] - memory.shown[name], most[name]) for name in UNITS}
-        narrow = {
-            "yaw_inertia": NARROW["yaw_inertia"] * self.yaw_inertia,
-            "front_axle_to_cg": NARROW["front_axle_to_cg"],
-        }
-        narrow |= {"steer_offset": NARROW["steer_offset"]}
-        narrow |= {"steering_ratio": NARROW["steering_ratio"] * self.steering_ratio}
-        known = {
-            name: (stds[name] < narrow[name]) & (jnp.abs(means[name] - shown[name]) < narrow[name]) for name in UNITS
-        }
-        age = memory.age + dt
-        memory = LearnerMemory(leaning, wheel, late, square, steer, turn, force, v_y, steering, turning, shown, age)
-        return memory, answer(shown, stds, known)
+        seen = Measurement(moment, (jnp.square(self.moment_error) + stays) * lasting, there)
+        return correct(now.turning, seen, Turning)
 
     def _understeer(self):
         rear = self.wheelbase - self.front_axle_to_cg

@@ -76,8 +76,7 @@ class AbstractRatio(AbstractMotionMethod):
 
     def begin(self, motion, heard):
         zero = jnp.zeros_like(motion.t)
-        # The prior is equivalent to an earlier measurement with this sum of squares.
-        start = jnp.square(RESIDUAL / self.prior_spread) * 2.0 * self.lasting + zero
+        start = self._start() + zero
         return RatioMemory(motion, zero, zero, zero, zero, zero, start, start * self.mass, zero, zero)
 
     def follow(self, motion, heard, memory):
@@ -101,14 +100,18 @@ class AbstractRatio(AbstractMotionMethod):
             motion, drive, brake, force, memory.slow_force + share * (force - memory.slow_force),
             memory.slow_rate + share * (heard["v_x_rate"] - memory.slow_rate), square, product, residual, memory.age + dt,
         )  # fmt: skip
-        # The mean square of residuals starts at the assumed one.
-        start = jnp.square(RESIDUAL / self.prior_spread) * 2.0 * self.lasting
+        start = self._start()
         gathered = jnp.maximum(square - start, 0.0)
+        # The mean square of residuals starts at the assumed one.
         mean_square = (residual + jnp.square(RESIDUAL)) / (memory.age + 1.0)
         variance = jnp.maximum(mean_square, jnp.square(RESIDUAL)) * 2.0 * self.lasting / (start + gathered)
         mass = product / square
         std = mass * numerics.sqrt(variance + jnp.square(OF_THE_CAR))
         return memory, answer({"mass": mass}, {"mass": std}, known=std < WIDEST_MASS * mass)
+
+    def _start(self):
+        """The sum of squares, (m/s^2)^2 s, of the earlier measurement to which the prior is equivalent."""
+        return jnp.square(RESIDUAL / self.prior_spread) * 2.0 * self.lasting
 
 
 def beyond(rate: Any, gate: Any) -> Any:

@@ -28,7 +28,7 @@ from jaxveh.io import replacing_file
 from jaxveh.sweeps import IN_MEMORY, Stores
 
 TRAINED_ON = ("passenger_car", "suv", "race_car", "ev", "truck")
-"""Measured cars of CommonRoad's vehicle models, none of them in the chapters."""
+"""Cars of `vehicles.sets`, of other sources than those of the chapters."""
 
 SEEDS, DURATION = 25, 40.0
 """Drives of each scenario, and s of each."""
