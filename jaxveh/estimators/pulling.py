@@ -12,7 +12,6 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators import mass_and_grade
 from jaxveh.estimators.body_motion import (
     SILENCE,
     SLOWEST,
@@ -20,18 +19,15 @@ from jaxveh.estimators.body_motion import (
     BodyMotion,
     away_from_zero,
     driven_share,
-    hold,
 )
 from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.lateral import motion_of
-from jaxveh.estimators.live import AbstractCleaning
-from jaxveh.estimators.method import AbstractSmoothable, Filtered, answer
+from jaxveh.estimators.method import AbstractSmoothable, answer
 from jaxveh.estimators.misfit import Misfit, Roughness, learn_roughness, no_misfit, no_roughness
 from jaxveh.estimators.sequential import Belief, Measurement, belief_of, correct_by_each, move, spread_of
 from jaxveh.estimators.sliding import Sliding
-from jaxveh.filters import Extended
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -61,9 +57,6 @@ OF_THE_CAR = 0.03
 """Relative standard deviation of the mass by errors of the torques and of the wheel radius in the car's file, which no drive
 shows: a force that is 3 % too large in all rows is a mass that is 3 % too large."""
 
-JOINT = (*ALONG, *[need._replace(optional=False) for need in TORQUES])
-"""The channels of the filter of `mass_and_grade`."""
-
 
 class PullingMemory(NamedTuple):
     """The last measurements, whether the car slides, and the belief; how noisy the log is: the `misfit` of wheels, satellites,
@@ -74,6 +67,14 @@ class PullingMemory(NamedTuple):
     belief: Belief
     misfit: Misfit
     roughness: Roughness
+
+
+class Torques(NamedTuple):
+    """The torques of a row, `drive` and `brake` (N m, zero where unknown), and whether both are measured, `told`."""
+
+    drive: Any
+    brake: Any
+    told: Any
 
 
 class Pulling(AbstractSmoothable, AbstractDriveForce):
@@ -168,7 +169,7 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
 
     def _ahead(self, belief: Belief, doubt, heard, roughness: Roughness) -> Belief:
         dt = heard["dt"]
-        fast = jnp.maximum(jnp.abs(State(*belief.mean).v_x), SLOWEST)
+        fast = _fast(State(*belief.mean).v_x)
         slow, quick = fast / self.grade_length, fast / self.grade_edge
         walk = 2.0 * jnp.square(self.grade_spread) * slow * quick * (slow + quick)
         # While a car slides, its rate of speed has an unknown part.
@@ -202,60 +203,73 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
         return self._felt(x, heard) + v_y * heard["yaw_rate"] - GRAVITY * numerics.sin(x.grade)
 
     def _measured(self, belief: Belief, slides, heard, values, misfit: Misfit) -> tuple[Belief, Misfit]:
-        v_x, dt = State(*belief.mean).v_x, jnp.maximum(heard["dt"], 1e-3)
-        fast = jnp.maximum(jnp.abs(v_x), SLOWEST)
-        drive, brake = values["drive_torque"], values["brake_torque"]
-        pushed = ~(jnp.isnan(drive) | jnp.isnan(brake))
-        drive, brake = jnp.where(pushed, drive, 0.0), jnp.where(pushed, brake, 0.0)
-        spoke, said = heard["speed_spoke"], values["speed"]
-        satellites = ~jnp.isnan(said)
-        steer = self.wheelbase * heard["yaw_rate"] / away_from_zero(v_x)
-        turning = heard["a_y"] * self.rear_axle_to_cg / self.wheelbase * steer
-
-        def balance(x):
-            force = self.drive_force(drive - brake, v_x, self._speeds_up(x, heard))
-            pull = force * jnp.exp(-x.log_mass) / self.mass
-            return self._felt(x, heard) - (pull - GRAVITY * self.rolling_resistance + x.rolling_bias - turning)
-
-        def satellite(x):
-            ago = x.v_x - self.delay * self._speeds_up(x, heard)
-            return jnp.where(satellites, said, 0.0) - ago
-
-        climbs = ~jnp.isnan(values["climb_rate"])
-        # The speed over ground of a car that slides laterally exceeds its v_x.
-        drifts = jnp.square(jnp.square(slides.across) / (2.0 * fast))
-
-        def climb(x):
-            passes = jnp.where(satellites, said, x.v_x - self.delay * self._speeds_up(x, heard))
-            rises = passes * numerics.sin(x.grade - self.delay * x.grade_rate)
-            return jnp.where(climbs, values["climb_rate"], 0.0) - rises
-
-        slowing = brake / (self.wheel_radius * self.mass)
-        # All wheels brake; in a car that drives both axles, the wheels that give the speed are driven, too.
-        pushing = drive * 2.0 * driven_share(self.motion.front_share) / (self.wheel_radius * self.mass)
-        noise = jnp.where(heard["speed_told"], self.told_noise, self.wheel_noise)
-        slips = jnp.square(noise) + jnp.square(0.002 * v_x * (slowing + pushing))
-        slips = slips + 2.0 * self.sliding.staying / dt * jnp.square(slides.along)
-        doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
-        # Wheels that spin or lock transmit less than their torque.
-        lost = (
-            (slowing + jnp.abs(drive) / (self.wheel_radius * self.mass)) * slides.along / (slides.along + 0.01 * fast)
+        """The belief after the row's measurements, and by how much their noise exceeds the assumed one."""
+        v_x, torques = State(*belief.mean).v_x, _torques_of(values)
+        measured = (
+            self._wheels(v_x, torques, slides, heard),
+            self._satellites(v_x, slides, heard, values),
+            self._climb(heard, values),
+            self._forces(v_x, torques, slides, heard),
         )
-        lasting = 2.0 * self.force_time / dt * (jnp.square(self.force_noise) + doubt + jnp.square(lost))
+        return correct_by_each(belief, measured, misfit, heard["dt"], State)
 
-        def wheels(x):
+    def _wheels(self, v_x, torques: Torques, slides, heard) -> Measurement:
+        """The speed of the wheels, of which those that brake or drive slip."""
+        # All wheels brake; in a car that drives both axles, the wheels that give the speed are driven, too.
+        size = self.wheel_radius * self.mass
+        pushing, slowing = torques.drive * 2.0 * driven_share(self.motion.front_share) / size, torques.brake / size
+
+        def residual(x):
             ago = x.v_x - self.wheel_delay * self._speeds_up(x, heard)
             return heard["v_x"] - ago * (1.0 + x.wheel_scale + x.slip * (pushing - slowing))
 
-        there = (heard["pull_silence"] < SILENCE) & (v_x > SLOWEST)
-        by_satellite = jnp.square(self.satellite_noise) + drifts
-        measured = (
-            Measurement(wheels, slips, spoke, 3.0),
-            Measurement(satellite, by_satellite, satellites & (v_x > 1.0), 3.0),
-            Measurement(climb, jnp.square(self.climb_noise), climbs, 3.0),
-            Measurement(balance, lasting + heard["rough"], pushed & there, 3.0),
-        )
-        return correct_by_each(belief, measured, misfit, heard["dt"], State)
+        noise = jnp.where(heard["speed_told"], self.told_noise, self.wheel_noise)
+        slips = jnp.square(noise) + jnp.square(0.002 * v_x * (slowing + pushing))
+        slips = slips + 2.0 * self.sliding.staying / _step(heard) * jnp.square(slides.along)
+        return Measurement(residual, slips, heard["speed_spoke"], 3.0)
+
+    def _satellites(self, v_x, slides, heard, values) -> Measurement:
+        """The speed over ground, which is late."""
+        there = ~jnp.isnan(values["speed"])
+        # That of a car that slides laterally exceeds its v_x.
+        drifts = jnp.square(jnp.square(slides.across) / (2.0 * _fast(v_x)))
+        residual = lambda x: jnp.where(there, values["speed"], 0.0) - self._late_speed(x, heard)
+        return Measurement(residual, jnp.square(self.satellite_noise) + drifts, there & (v_x > 1.0), 3.0)
+
+    def _climb(self, heard, values) -> Measurement:
+        """The climb rate over ground, `v_x sin(grade)`, which is as late."""
+        there = ~jnp.isnan(values["climb_rate"])
+
+        def residual(x):
+            passes = jnp.where(jnp.isnan(values["speed"]), self._late_speed(x, heard), values["speed"])
+            rises = passes * numerics.sin(x.grade - self.delay * x.grade_rate)
+            return jnp.where(there, values["climb_rate"], 0.0) - rises
+
+        return Measurement(residual, jnp.square(self.climb_noise), there, 3.0)
+
+    def _forces(self, v_x, torques: Torques, slides, heard) -> Measurement:
+        """The balance of forces: the specific force less that of torques, rolling, air and the steered front wheels."""
+        steer = self.wheelbase * heard["yaw_rate"] / away_from_zero(v_x)
+        turning = heard["a_y"] * self.rear_axle_to_cg / self.wheelbase * steer
+        size = self.wheel_radius * self.mass
+        slowing = torques.brake / size
+
+        def residual(x):
+            force = self.drive_force(torques.drive - torques.brake, v_x, self._speeds_up(x, heard))
+            pull = force * jnp.exp(-x.log_mass) / self.mass
+            return self._felt(x, heard) - (pull - GRAVITY * self.rolling_resistance + x.rolling_bias - turning)
+
+        doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
+        # Wheels that spin or lock transmit less than their torque.
+        lost = (slowing + jnp.abs(torques.drive) / size) * slides.along / (slides.along + 0.01 * _fast(v_x))
+        white = jnp.square(self.force_noise) + doubt + jnp.square(lost)
+        lasting = 2.0 * self.force_time / _step(heard) * white
+        there = torques.told & (heard["pull_silence"] < SILENCE) & (v_x > SLOWEST)
+        return Measurement(residual, lasting + heard["rough"], there, 3.0)
+
+    def _late_speed(self, x, heard):
+        """The speed (m/s) at the time that satellites tell of."""
+        return x.v_x - self.delay * self._speeds_up(x, heard)
 
     def say(self, memory):
         motion, belief = memory.motion, memory.belief
@@ -275,6 +289,22 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
         return answer(said, stds, known)
 
 
+def _torques_of(values) -> Torques:
+    drive, brake = values["drive_torque"], values["brake_torque"]
+    told = ~(jnp.isnan(drive) | jnp.isnan(brake))
+    return Torques(jnp.where(told, drive, 0.0), jnp.where(told, brake, 0.0), told)
+
+
+def _fast(v_x):
+    """The size of the speed, m/s, away from zero."""
+    return jnp.maximum(jnp.abs(v_x), SLOWEST)
+
+
+def _step(heard):
+    """The time since the last row, s, away from zero."""
+    return jnp.maximum(heard["dt"], 1e-3)
+
+
 def pulling_filter(car: CarSpecification, who: str, **options: Any) -> Pulling:
     """The filter for a car's file. **Raises** `InputError` for a file without `wheel_radius`, which converts a torque into a
     force."""
@@ -290,52 +320,3 @@ def pulling_filter(car: CarSpecification, who: str, **options: Any) -> Pulling:
         **numbers_in(car, "wheel_inertia", "drag", "rolling_resistance", "pitch_gradient"),
         **options,
     )
-
-
-class Held(AbstractCleaning):
-    """Prepares a row for the filter of `mass_and_grade`: the last measured torques; the speed and the accelerometer without the
-    body's pitch, both NaN where not measured."""
-
-    motion: BodyMotion
-    pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005)
-
-    @property
-    def channels(self):
-        return tuple(need.channel for need in JOINT)
-
-    def first(self, t, values):
-        motion, heard = self.motion.first(t, values)
-        return self._next(motion, heard, values, jnp.zeros_like(t), jnp.zeros_like(t))
-
-    def next(self, memory, t, values):
-        motion, heard = self.motion.next(memory[0], t, values)
-        return self._next(motion, heard, values, *memory[1:])
-
-    def _next(self, motion, heard, values, drive, brake):
-        drive, brake = hold(values["drive_torque"], drive), hold(values["brake_torque"], brake)
-        silent = jnp.isnan(values["a_x"])
-        felt = jnp.where(silent, 0.0, values["a_x"]) / (1.0 + GRAVITY * self.pitch_gradient)
-        made = {
-            "drive_torque": drive,
-            "brake_torque": brake,
-            "v_x": jnp.where(heard["speed_spoke"], heard["v_x"], jnp.nan),
-            "a_x": jnp.where(silent, jnp.nan, felt),
-        }
-        return (motion, drive, brake), heard | made
-
-
-def joint_filter(car: CarSpecification, shown: tuple[str, ...]) -> Filtered:
-    """The filter of `mass_and_grade` with accelerometer and offset, as a method. **Raises** as `mass_and_grade.model` does.
-
-    The prior speed is 20 m/s with a standard deviation of 20. Bends, slip, and grades that change with distance are not in its
-    model. `known` where the standard deviation of the mass is below `WIDEST_MASS` of it, and that of the grade below `WIDEST`;
-    where the pedals move too seldom to determine the mass, as the model's docstring explains, both are large.
-    """
-    model = mass_and_grade.model(car, v_x=0.1, a_x=0.5, a_x_bias=0.06, mass_spread=0.15, grade_rate_walk=0.02)
-    cleaning = Held(motion_of(car), car.pitch_gradient or 0.0)
-    return Filtered(model, Extended(), JOINT, cleaning, _joint_told, shown)
-
-
-def _joint_told(model, belief, row):
-    mean, std = belief.moments(model)
-    return {"grade": std.grade < WIDEST, "mass": std.mass < WIDEST_MASS * mean.mass}

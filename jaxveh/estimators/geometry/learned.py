@@ -12,7 +12,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_flags, check_positive, path_of
 from jaxveh._core.version import VERSION
-from jaxveh.estimators.geometry.learner import UNITS, Learner
+from jaxveh.estimators.geometry.learner import RELATIVE, UNITS, Learner
 from jaxveh.io import kit, write_text
 
 KEYS = ("value", "std", "unit", "valid")
@@ -22,9 +22,6 @@ SPREADS = {
     "steering_ratio": "ratio_spread",
 }  # fmt: skip
 """The learner's parameter that has the standard deviation of a number before a drive."""
-
-RELATIVE = ("yaw_inertia", "steering_ratio")
-"""Numbers whose standard deviation is relative in the learner."""
 
 
 class Entry(NamedTuple):

@@ -10,11 +10,11 @@ import jax.numpy as jnp
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.body_motion import SILENCE, SLOWEST, BodyMotion, hold
+from jaxveh.estimators.joint import JOINT
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.mass.ratios import START, Pull, beyond, pull_of
 from jaxveh.estimators.method import Filtered
-from jaxveh.estimators.pulling import JOINT
 from jaxveh.io import CarSpecification
 from jaxveh.observers import RecursiveLeastSquares
 from jaxveh.statespace import Prior, StateSpace

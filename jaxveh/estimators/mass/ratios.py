@@ -13,9 +13,10 @@ from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import SILENCE, SLOWEST, AbstractMotionMethod, hold
 from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.drive_force import AbstractDriveForce
+from jaxveh.estimators.joint import JOINT
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import answer
-from jaxveh.estimators.pulling import JOINT, OF_THE_CAR, WIDEST_MASS
+from jaxveh.estimators.pulling import OF_THE_CAR, WIDEST_MASS
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
