@@ -204,6 +204,11 @@ def away_from_zero(v_x: Any) -> Any:
     return regularised_speed(v_x, CRAWL)
 
 
+def passing_speed(v_x: Any) -> Any:
+    """The size of a speed, at least `SLOWEST`, m/s: how fast a road's slopes pass below the car."""
+    return jnp.maximum(jnp.abs(v_x), SLOWEST)
+
+
 def arcsin_of(a: Any) -> Any:
     """The angle at which gravity's component equals an acceleration `a` (m/s^2), rad; limited to the angle of 0.9 g."""
     s = jnp.clip(a / GRAVITY, -0.9, 0.9)

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.body_motion import LATERAL, SILENCE, SLOWEST, BodyMotion, away_from_zero
+from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_from_zero, passing_speed
 from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
@@ -144,7 +144,7 @@ class Leaning(AbstractSmoothable):
     def _ahead(self, belief: Belief, heard, roughness) -> Belief:
         dt = heard["dt"]
         force, turn = (one.variance for one in roughness)
-        fast = self._passing(heard["v_x"])
+        fast = passing_speed(heard["v_x"])
         # The law of the bank by distance: a chain of two first-order lags, with this variance.
         slow, quick = fast / self.bank_length, fast / self.bank_edge
         bank_walk = 2.0 * jnp.square(self.bank_spread) * slow * quick * (slow + quick)
@@ -155,9 +155,6 @@ class Leaning(AbstractSmoothable):
         }  # fmt: skip
         step = lambda x: self._step(x, heard, slow, quick)
         return move(belief, step, {name: value * dt for name, value in per_second.items()}, State)
-
-    def _passing(self, v_x):
-        return jnp.maximum(jnp.abs(v_x), SLOWEST)
 
     def _plane_force(self, x, heard):
         return heard["a_y"] - x.a_y_bias - GRAVITY * x.body_roll
@@ -184,53 +181,58 @@ class Leaning(AbstractSmoothable):
         )
 
     def _measured(self, belief: Belief, heard, agreement: AgreementMemory | None, misfit: Misfit):
-        v_x, dt = heard["v_x"], heard["dt"]
-        fast = away_from_zero(v_x)
+        """The belief after the row's measurements, and by how much their noise exceeds the assumed one."""
+        measured = (self._rear_axle(heard, agreement), self._course(heard), self._roll_rate(heard))
+        return correct_by_each(belief, measured, misfit, heard["dt"], State)
 
-        def rear(x):
+    def _rear_axle(self, heard, agreement: AgreementMemory | None) -> Measurement:
+        """The rear axle's slip angle, which follows from its force."""
+        fast = away_from_zero(heard["v_x"])
+
+        def residual(x):
             turn = heard["yaw_rate"] - x.yaw_rate_bias
-            slip = self.rear_compliance * (1.0 + x.rear_scale) * self._plane_force(x, heard) * (v_x / fast)
+            slip = self.rear_compliance * (1.0 + x.rear_scale) * self._plane_force(x, heard) * (heard["v_x"] / fast)
             return -(x.v_y - self.rear_axle_to_cg * turn) / fast - slip
 
-        def course(x):
+        # A correlated error counts once per correlation time, however many rows there are; in hard turns tyres are not linear.
+        repeats = 2.0 * self.slip_error_time / jnp.maximum(heard["dt"], 1e-3)
+        lasting = jnp.square(self.slip_error) * repeats
+        fourth = lambda x: jnp.square(jnp.square(x))
+        variance = lasting * (1.0 + fourth(heard["a_y"] / LINEAR))
+        if agreement is not None:
+            variance = variance + lasting * fourth(agreement.doubt)
+        return Measurement(residual, variance, heard["silence"] < SILENCE, self.slip_gate, FALL, repeats)
+
+    def _course(self, heard) -> Measurement:
+        """The course of the satellites, which is late."""
+        v_x, there = heard["v_x"], ~jnp.isnan(heard["course"])
+        fast = away_from_zero(v_x)
+
+        def residual(x):
             turn = heard["yaw_rate"] - x.yaw_rate_bias
             drifts = (self._plane_force(x, heard) - GRAVITY * x.bank - v_x * turn) / fast
             rate = drifts + heard["late_yaw_rate"] - x.yaw_rate_bias
             said = x.yaw + numerics.arctan2(x.v_y, fast) - self.delay * rate
-            return numerics.wrap_angle(jnp.where(satellites, heard["course"], 0.0) - said)
+            return numerics.wrap_angle(jnp.where(there, heard["course"], 0.0) - said)
 
-        def rolling(x):
+        return Measurement(residual, jnp.square(self.across / fast), there & (v_x > 1.0), 3.0)
+
+    def _roll_rate(self, heard) -> Measurement:
+        """The gyroscope about the car's x axis: the rates of body and bank, and a part of the yaw rate where the car pitches."""
+        there, forgets = ~jnp.isnan(heard["roll_rate"]), passing_speed(heard["v_x"]) / self.bank_length
+
+        def residual(x):
             turn = heard["yaw_rate"] - x.yaw_rate_bias
-            said = (
-                x.body_roll_rate
-                + x.bank_rate
-                - forgets * x.bank
-                + turn * (heard["slope"] + x.slope_bias)
-                + x.roll_rate_bias
-            )
-            return jnp.where(gyroscope, heard["roll_rate"], 0.0) - said
+            pitched = turn * (heard["slope"] + x.slope_bias)
+            said = x.body_roll_rate + x.bank_rate - forgets * x.bank + pitched + x.roll_rate_bias
+            return jnp.where(there, heard["roll_rate"], 0.0) - said
 
-        forgets = self._passing(v_x) / self.bank_length
-        satellites, gyroscope = ~jnp.isnan(heard["course"]), ~jnp.isnan(heard["roll_rate"])
-        # A correlated error counts once per correlation time, however many rows there are; in hard turns tyres are not linear.
-        repeats = 2.0 * self.slip_error_time / jnp.maximum(dt, 1e-3)
-        lasting = jnp.square(self.slip_error) * repeats
-        fourth = lambda x: jnp.square(jnp.square(x))
-        slip = lasting * (1.0 + fourth(heard["a_y"] / LINEAR))
-        if agreement is not None:
-            slip = slip + lasting * fourth(agreement.doubt)
-        there = heard["silence"] < SILENCE
-        measured = (
-            Measurement(rear, slip, there, self.slip_gate, FALL, repeats),
-            Measurement(course, jnp.square(self.across / fast), satellites & (v_x > 1.0), 3.0),
-            Measurement(rolling, jnp.square(self.roll_rate_noise), gyroscope),
-        )
-        return correct_by_each(belief, measured, misfit, dt, State)
+        return Measurement(residual, jnp.square(self.roll_rate_noise), there)
 
     def say(self, memory):
         motion, belief = memory.motion, memory.belief
         x = State(*belief.mean)
-        forgets = self._passing(motion.v_x) / self.bank_length
+        forgets = passing_speed(motion.v_x) / self.bank_length
         wide = lambda *names: spread_of(belief, dict.fromkeys(names, 1.0), State)
         said = {
             "bank": x.bank,

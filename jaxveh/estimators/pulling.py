@@ -19,6 +19,7 @@ from jaxveh.estimators.body_motion import (
     BodyMotion,
     away_from_zero,
     driven_share,
+    passing_speed,
 )
 from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
@@ -169,7 +170,7 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
 
     def _ahead(self, belief: Belief, doubt, heard, roughness: Roughness) -> Belief:
         dt = heard["dt"]
-        fast = _fast(State(*belief.mean).v_x)
+        fast = passing_speed(State(*belief.mean).v_x)
         slow, quick = fast / self.grade_length, fast / self.grade_edge
         walk = 2.0 * jnp.square(self.grade_spread) * slow * quick * (slow + quick)
         # While a car slides, its rate of speed has an unknown part.
@@ -232,7 +233,7 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
         """The speed over ground, which is late."""
         there = ~jnp.isnan(values["speed"])
         # That of a car that slides laterally exceeds its v_x.
-        drifts = jnp.square(jnp.square(slides.across) / (2.0 * _fast(v_x)))
+        drifts = jnp.square(jnp.square(slides.across) / (2.0 * passing_speed(v_x)))
         residual = lambda x: jnp.where(there, values["speed"], 0.0) - self._late_speed(x, heard)
         return Measurement(residual, jnp.square(self.satellite_noise) + drifts, there & (v_x > 1.0), 3.0)
 
@@ -261,7 +262,7 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
 
         doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
         # Wheels that spin or lock transmit less than their torque.
-        lost = (slowing + jnp.abs(torques.drive) / size) * slides.along / (slides.along + 0.01 * _fast(v_x))
+        lost = (slowing + jnp.abs(torques.drive) / size) * slides.along / (slides.along + 0.01 * passing_speed(v_x))
         white = jnp.square(self.force_noise) + doubt + jnp.square(lost)
         lasting = 2.0 * self.force_time / _step(heard) * white
         there = torques.told & (heard["pull_silence"] < SILENCE) & (v_x > SLOWEST)
@@ -293,11 +294,6 @@ def _torques_of(values) -> Torques:
     drive, brake = values["drive_torque"], values["brake_torque"]
     told = ~(jnp.isnan(drive) | jnp.isnan(brake))
     return Torques(jnp.where(told, drive, 0.0), jnp.where(told, brake, 0.0), told)
-
-
-def _fast(v_x):
-    """The size of the speed, m/s, away from zero."""
-    return jnp.maximum(jnp.abs(v_x), SLOWEST)
 
 
 def _step(heard):
