@@ -175,25 +175,8 @@ def create(
         )
     part = path.with_name(f"{path.name}.part")
     group = zarr.open_group(part, mode="w", zarr_format=3)
-    for axis in design.axes:
-        if axis.choice:
-            labels = group.create_array(axis.name, shape=(len(axis.labels),), dtype="str", dimension_names=(axis.name,))
-            labels[:] = np.asarray([str(label) for label in axis.labels])
-        else:
-            dtype = float if axis.columns is None else np.int64
-            group.create_array(axis.name, data=np.asarray(axis.labels, dtype), dimension_names=(axis.name,))
-            for name, column in (axis.columns or {}).items():
-                group.create_array(f"{axis.name}.{name}", data=column, dimension_names=(axis.name,))
-    names = [axis.name for axis in design.axes]
-    for name, one in values.items():
-        group.create_array(
-            name,
-            shape=(*(len(axis.values) for axis in design.axes), plan.shape[-1], *one.shape),
-            chunks=(*_block(design, plan), *(max(1, n) for n in one.shape)),
-            dtype=one.dtype,
-            fill_value=fill_value_of(one.dtype),
-            dimension_names=(*names, SEED, *(f"{name}{OWN}{i}" for i in range(len(one.shape)))),
-        )
+    _write_axes(group, design)
+    _make_values(group, design, plan, values)
     group.create_array(
         STATUS, shape=(plan.chunks,), chunks=(1,), dtype="int8", fill_value=NOT_DONE, dimension_names=("chunk",)
     )
@@ -214,6 +197,33 @@ def create(
         zarr.consolidate_metadata(part)
     part.rename(path)
     return Store(path)
+
+
+def _write_axes(group: Any, design: Design) -> None:
+    """The labels of choices, the numbers of axes, and the columns of samples."""
+    for axis in design.axes:
+        if axis.choice:
+            labels = group.create_array(axis.name, shape=(len(axis.labels),), dtype="str", dimension_names=(axis.name,))
+            labels[:] = np.asarray([str(label) for label in axis.labels])
+        else:
+            dtype = float if axis.columns is None else np.int64
+            group.create_array(axis.name, data=np.asarray(axis.labels, dtype), dimension_names=(axis.name,))
+            for name, column in (axis.columns or {}).items():
+                group.create_array(f"{axis.name}.{name}", data=column, dimension_names=(axis.name,))
+
+
+def _make_values(group: Any, design: Design, plan: Plan, values: Mapping[str, Any]) -> None:
+    """An array for each value, with a place for every run and chunks as the plan has them."""
+    names = [axis.name for axis in design.axes]
+    for name, one in values.items():
+        group.create_array(
+            name,
+            shape=(*(len(axis.values) for axis in design.axes), plan.shape[-1], *one.shape),
+            chunks=(*_block(design, plan), *(max(1, n) for n in one.shape)),
+            dtype=one.dtype,
+            fill_value=fill_value_of(one.dtype),
+            dimension_names=(*names, SEED, *(f"{name}{OWN}{i}" for i in range(len(one.shape)))),
+        )
 
 
 def fill_value_of(dtype: Any) -> Any:

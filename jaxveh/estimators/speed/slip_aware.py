@@ -255,16 +255,19 @@ class SlipAware(AbstractMethod):
         known = jnp.stack([self._speaks(memory, name) for name in brakes]) & self._speaks(memory, "drive_torque")
         return jnp.where(known, by_torque, force) / load - car.rolling_resistance, load
 
-    def _use_wheels(self, memory: Memory, belief: Belief, t, step, wheels):
-        there = ~jnp.isnan(wheels)
+    def _smooth_wheels(self, memory: Memory, t, wheels, there):
+        """The low-passed speeds of the wheels (m/s), and by how much each is trusted because its rate is the car's, (4,) each."""
         waited = jnp.where(there, t - memory.smooth_at, 0.0)
         mixed = 1.0 - jnp.exp(-waited / self.smoothing)
         smooth = memory.smooth + mixed * (jnp.where(there, wheels, memory.smooth) - memory.smooth)
         rates = (jnp.where(there, wheels, smooth) - smooth) / self.smoothing
         # Without an accelerometer the car's rate is that of the wheels.
         gate = self.rate_gate * jnp.where(self._speaks(memory, "a_x"), 1.0, 4.0)
-        gate = gate * numerics.sqrt(memory.misfit.times[2])
-        steady = beyond((rates - memory.rate) / gate)
+        return smooth, beyond((rates - memory.rate) / (gate * numerics.sqrt(memory.misfit.times[2])))
+
+    def _use_wheels(self, memory: Memory, belief: Belief, t, step, wheels):
+        there = ~jnp.isnan(wheels)
+        smooth, steady = self._smooth_wheels(memory, t, wheels, there)
         said = self._wheels(memory, belief.mean)
         suspicion = memory.suspicion * jnp.exp(-step / self.spreads.suspicion_time)
         most = jnp.sort(suspicion)[1]
