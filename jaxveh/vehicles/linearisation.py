@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jaxveh._core.errors import check_has
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
 from jaxveh.vehicles.base import GRAVITY, AbstractVehicle
+from jaxveh.vehicles.fourteen_dof import FourteenDOF
 from jaxveh.vehicles.linear_handling import LinearSingleTrack
 from jaxveh.vehicles.steering import FrontSteering
 
@@ -23,7 +24,8 @@ def linear_single_track(car: Any, *, cg_height: Any = None) -> LinearSingleTrack
 
     `car` is a single track, whose tyres are those of the axles, or a car with tracks, whose tyres are those of the wheels. In
     the second case the stiffness of an axle is twice that of a wheel with half its load. The `steering` is that of the car. The
-    slope is that of the lateral force over slip angle at zero slip (of the steady force for a tyre with states). With a
+    slope is that of the lateral force over slip angle at zero slip (of the steady force for a tyre with states). The centre of
+    gravity is that of the whole car: that of a `FourteenDOF` lies some centimetres from that of its sprung mass. With a
     `cg_height` (m) the stiffness is proportional to load, see `LinearSingleTrack`. Of a car inside another (`AntiLock`,
     `Steered`, ...) it is the model of the inner one, and of a `LinearSingleTrack` that car itself with the given `cg_height`.
 
@@ -35,12 +37,13 @@ def linear_single_track(car: Any, *, cg_height: Any = None) -> LinearSingleTrack
         return dataclasses.replace(car, cg_height=cg_height)
     needed = ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg", "front", "rear")
     check_has("linear_single_track: car", car, needed)
-    a, b = car.front_axle_to_cg, car.rear_axle_to_cg
-    weight = car.mass * GRAVITY / (a + b)
+    whole = car.whole if isinstance(car, FourteenDOF) else car
+    a, b = whole.front_axle_to_cg, whole.rear_axle_to_cg
+    weight = whole.mass * GRAVITY / (a + b)
     wheels = 2.0 if hasattr(car, "track_front") else 1.0
     return LinearSingleTrack(
-        mass=car.mass,
-        yaw_inertia=car.yaw_inertia,
+        mass=whole.mass,
+        yaw_inertia=whole.yaw_inertia,
         front_axle_to_cg=a,
         rear_axle_to_cg=b,
         front_stiffness=wheels * settled_stiffness(car.front, weight * b / wheels),

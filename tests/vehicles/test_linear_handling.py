@@ -7,6 +7,7 @@ import pytest
 from planar_cars import linear, point
 
 from jaxveh import InputError, vehicles
+from jaxveh._core.names import record
 from jaxveh.roads import Ground
 from jaxveh.vehicles import GRAVITY
 
@@ -209,6 +210,23 @@ def test_the_axles_of_a_car_with_tracks_have_two_tyres():
     same = vehicles.linear_single_track(seven, cg_height=0.5)
     np.testing.assert_allclose([same.front_stiffness, same.rear_stiffness], 70e3, rtol=1e-8)
     assert float(same.cg_height) == 0.5
+
+
+@pytest.mark.parametrize("name", [name for name, numbers in vehicles.kit.CARS.items() if numbers().suspension])
+def test_the_linear_car_of_fourteen_degrees_of_freedom_is_the_whole_car(name):
+    """The sets' mass and inertia are those of the whole car. Its weight is divided between the axles as that of the car at rest
+    on its springs, whose centre of gravity is not that of the body alone."""
+    numbers, car = vehicles.kit.CARS[name](), vehicles.named_car(name, "fourteen-dof")
+    plain = vehicles.linear_single_track(car)
+    np.testing.assert_allclose([plain.mass, plain.yaw_inertia], [numbers.mass, numbers.yaw_inertia], rtol=5e-3)
+    u = record("Inputs", {name: jnp.zeros(()) for name in car.inputs})
+    at_rest = car.outputs(0.0, car.start(0.0, u), u)
+    front = (at_rest.load_fl + at_rest.load_fr) / (
+        at_rest.load_fl + at_rest.load_fr + at_rest.load_rl + at_rest.load_rr
+    )
+    a, b = plain.front_axle_to_cg, plain.rear_axle_to_cg
+    np.testing.assert_allclose(b / (a + b), front, rtol=1e-6)
+    np.testing.assert_allclose(a + b, numbers.front_axle_to_cg + numbers.rear_axle_to_cg, rtol=1e-6)
 
 
 def test_a_tyre_with_states_counts_as_settled():

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import jax
-
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters
 from jaxveh.roads import LEVEL, Ground
@@ -88,11 +86,6 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
     def __check_init__(self):
         check_parameters(self)
         check_fourteen_dof(self)
-
-    @property
-    def mass(self) -> jax.Array:
-        """The mass of the whole car, kg."""
-        return self.sprung_mass + 2.0 * (self.unsprung_mass_front + self.unsprung_mass_rear)
 
     @property
     def inputs(self):

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY
+from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.vehicles.drive import AbstractDriven
 from jaxveh.vehicles.two_track import AbstractTwoTrack
+
+
+class Whole(NamedTuple):
+    """Body and wheels of a car together: `mass` (kg), `yaw_inertia` (kg m^2, about the centre of gravity of the whole car), and
+    the distances of the axles from it (m)."""
+
+    mass: Any
+    yaw_inertia: Any
+    front_axle_to_cg: Any
+    rear_axle_to_cg: Any
 
 
 class AbstractSuspendedTwoTrack(AbstractDriven, AbstractTwoTrack):
@@ -50,3 +62,19 @@ class AbstractSuspendedTwoTrack(AbstractDriven, AbstractTwoTrack):
     camber_front: jax.Array = parameter("rad", scale=0.02, default=0.0)
     camber_rear: jax.Array = parameter("rad", scale=0.02, default=0.0)
     ackermann: jax.Array = parameter("-", scale=1.0, default=0.0)
+
+    @property
+    def mass(self) -> jax.Array:
+        """The mass of the whole car, kg."""
+        return self.sprung_mass + 2.0 * (self.unsprung_mass_front + self.unsprung_mass_rear)
+
+    @property
+    def whole(self) -> Whole:
+        """The car with its wheels, at rest: its centre of gravity is not that of the sprung mass."""
+        length = self.front_axle_to_cg + self.rear_axle_to_cg
+        front, rear = 2.0 * self.unsprung_mass_front, 2.0 * self.unsprung_mass_rear
+        a = (self.sprung_mass * self.front_axle_to_cg + rear * length) / self.mass
+        b = length - a
+        inertia = self.yaw_inertia + self.sprung_mass * jnp.square(a - self.front_axle_to_cg)
+        inertia = inertia + front * (jnp.square(a) + 0.25 * jnp.square(self.track_front))
+        return Whole(self.mass, inertia + rear * (jnp.square(b) + 0.25 * jnp.square(self.track_rear)), a, b)

@@ -90,7 +90,7 @@ def drive_once(built: FourteenDOF, scenario: Scenario, key, *, duration: float) 
     car = true_car(built, scenario, car_key)
     driver = SpeedControl(
         _wander(scenario, steer_key, speed_key, duration),
-        total_mass(car.vehicle),
+        car.vehicle.mass,
         wheel_radius=car.vehicle.wheel_radius,
     )
     found = simulate(
@@ -157,7 +157,7 @@ def _own_numbers(car: FourteenDOF, channels: dict[str, Any]) -> dict[str, Any]:
     summed = lambda name, axle: channels[f"true.{name}_{axle}l"] + channels[f"true.{name}_{axle}r"]
     slope = lambda axle: slope_at_zero(summed("F_y", axle), 0.5 * summed("slip_angle", axle))
     own = {
-        "mass": total_mass(car), "yaw_inertia": plain.yaw_inertia, "front_axle_to_cg": plain.front_axle_to_cg,
+        "mass": plain.mass, "yaw_inertia": plain.yaw_inertia, "front_axle_to_cg": plain.front_axle_to_cg,
         "front_cornering_stiffness": slope("f"), "rear_cornering_stiffness": slope("r"),
         "steering_ratio": jnp.asarray(STEERING_RATIO), "steer_offset": jnp.asarray(STEER_OFFSET),
     }  # fmt: skip
@@ -199,11 +199,6 @@ def _made_of(
         | {name: jnp.where(silent, jnp.nan, one) for name, one in heard.items()}
         | {"steering_torque": felt}
     )
-
-
-def total_mass(car: FourteenDOF) -> jax.Array:
-    """Mass of body and wheels, kg."""
-    return car.sprung_mass + 2.0 * (car.unsprung_mass_front + car.unsprung_mass_rear)
 
 
 def _wander(scenario: Scenario, steer_key, speed_key, duration: float) -> Wander:
