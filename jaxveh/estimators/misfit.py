@@ -37,7 +37,7 @@ def no_misfit(count: int, like: Any, first: float = CAUTION, seconds: float = FI
     """The misfit of `count` measurements before the first row, in the dtype of `like`: `first`, as if learnt from so many
     `seconds`."""
     ones = jnp.ones((count,), jnp.result_type(like))
-    return Misfit(first * ones, seconds * ones, 0.0 * ones)
+    return Misfit(first * ones, seconds * ones, jnp.zeros_like(ones))
 
 
 def learn_misfit(misfit: Misfit, squares: Any, dt: Any, learn_time: Any = LEARN_TIME) -> Misfit:

@@ -54,7 +54,7 @@ WIDEST = math.radians(0.8)
 WIDEST_MASS = 0.05
 """With a larger standard deviation of its logarithm, the mass counts as unknown."""
 
-OF_THE_CAR = 0.03
+OF_THE_TORQUES = 0.03
 """Relative standard deviation of the mass by errors of the torques and of the wheel radius in the car's file, which no drive
 shows: a force that is 3 % too large in all rows is a mass that is 3 % too large."""
 
@@ -277,7 +277,7 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
         x = State(*belief.mean)
         wide = {name: spread_of(belief, {name: 1.0}, State) for name in State._fields}
         mass = self.mass * jnp.exp(x.log_mass)
-        relative = numerics.hypot(wide["log_mass"], OF_THE_CAR)
+        relative = numerics.hypot(wide["log_mass"], OF_THE_TORQUES)
         said = {"grade": x.grade, "mass": mass, "v_x": x.v_x, "a_x_bias": x.a_x_bias}
         stds = {
             "grade": wide["grade"],

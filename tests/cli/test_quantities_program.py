@@ -82,7 +82,7 @@ def test_rows_are_estimated_from_all_rows_unless_as_in_a_car(drive, live):
     expected = estimators.stiffness.estimate(method_logs.CAR, log, smoothed=not live)
     np.testing.assert_allclose(frame[column], expected["front_cornering_stiffness"], rtol=1e-12)
     smoothed = json.loads((drive / "n.json").read_text())["stiffness"]["smoothed"]
-    assert smoothed == ([] if live else ["walking"])
+    assert smoothed == ([] if live else [estimators.stiffness.RECOMMENDED])
     assert ("up to it" in result.stdout) == live
 
 

@@ -229,16 +229,22 @@ def test_gradients_with_respect_to_its_numbers_and_its_rows_are_finite_and_right
         # Of what draws, the value itself jumps where other particles are chosen.
         if leaf.ndim or np.isinf(leaf) or draws(method):
             continue
-        step = 1e-5 * max(abs(float(leaf)), 1e-3)
-        ahead, behind = (
-            jax.tree.unflatten(structure, [*leaves[:k], leaf + d, *leaves[k + 1 :]]) for d in (step, -step)
-        )
-        difference = (with_slopes(ahead, values)[0] - with_slopes(behind, values)[0]) / (2.0 * step)
-        found = jax.tree.leaves(slopes[0])[k]
-        # A total of thousands (kg m^2) has no more digits in its difference than this.
-        rounding = 0.5 * np.finfo(float).eps * abs(float(here)) / step
-        atol = 1e-4 * (abs(float(found)) + 1e-2) + rounding
-        np.testing.assert_allclose(found, difference, rtol=2e-3, atol=atol, err_msg=str(k))
+        found = float(jax.tree.leaves(slopes[0])[k])
+
+        def misses(share, k=k, leaf=leaf, found=found):
+            """By how much the slope and a difference over this share of the number differ, over the tolerance."""
+            step = share * max(abs(float(leaf)), 1e-3)
+            ahead, behind = (
+                jax.tree.unflatten(structure, [*leaves[:k], leaf + d, *leaves[k + 1 :]]) for d in (step, -step)
+            )
+            difference = float(with_slopes(ahead, values)[0] - with_slopes(behind, values)[0]) / (2.0 * step)
+            # A total of thousands (kg m^2) has no more digits in its difference than this.
+            rounding = 0.5 * np.finfo(float).eps * abs(float(here)) / step
+            tolerance = 1e-4 * (abs(found) + 1e-2) + rounding + 2e-3 * abs(difference)
+            return abs(found - difference) / tolerance
+
+        # Where a filter amplifies its rounding, a longer difference is the better one.
+        assert misses(1e-5) <= 1.0 or misses(1e-4) <= 1.0, (k, found)
 
 
 @every

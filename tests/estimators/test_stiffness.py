@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import method_logs
 import numpy as np
 import pytest
+from steady_logs import pushed
 
 from jaxveh import Recording, manoeuvres, sensors, simulate, vehicles
 from jaxveh.estimators import stiffness
@@ -30,12 +31,12 @@ def magic(slope, slip, grip):
     return grip * np.sin(1.4 * np.arctan(x + 0.5 * (x - np.arctan(x))))
 
 
-def drive(noise=0.0, lean=0.0, offset=0.0, curve=linear, most=0.01):
+def drive(noise=0.0, lean=0.0, offset=0.0, curve=linear, most=0.01, trail=0.03, friction=1.0):
     """A single track whose axles have the slopes FRONT and REAR at zero slip, as sensors show it, and the satellite's course.
-    `most` (rad): amplitude of each of four harmonics of the steer."""
+    `most` (rad): amplitude of each of four harmonics of the steer; `trail` (m): from the force to the axle before it."""
     rng = np.random.default_rng(3)
     a, b, m, j = CAR.front_axle_to_cg, CAR.rear_axle_to_cg, CAR.mass, CAR.yaw_inertia
-    grips = [9.81 * m / (a + b) * arm for arm in (b, a)]
+    grips = [friction * 9.81 * m / (a + b) * arm for arm in (b, a)]
     steer_at = lambda t: most * sum(np.sin(rate * t + rate) for rate in (1.1, 2.3, 4.7, 7.1))
 
     def forces(x, steer):
@@ -44,7 +45,7 @@ def drive(noise=0.0, lean=0.0, offset=0.0, curve=linear, most=0.01):
 
     def rates(x, t):
         front, rear = forces(x, steer_at(t))
-        return np.array([(front + rear) / m - SPEED * x[1], (a * front - b * rear) / j])
+        return np.array([(front + rear) / m - SPEED * x[1], ((a - trail) * front - (b + trail) * rear) / j])
 
     x, states = np.zeros(2), []
     for t in T:
@@ -76,8 +77,9 @@ def estimated(name, channels, car=CAR):
 
 @pytest.mark.parametrize(("name", "within"), [("walking", 0.05), ("axle_forces", 0.05), ("derivatives", 0.05)])
 def test_a_car_without_noise_shows_its_stiffnesses(name, within):
-    """The older methods are those of a linear car."""
-    said = estimated(name, drive(lean=0.059, curve=magic if name == "walking" else linear))
+    """The older methods are those of a linear car, whose forces act at the axles."""
+    ours = name == "walking"
+    said = estimated(name, drive(lean=0.059, **({"curve": magic} if ours else {"trail": 0.0})))
     for field, truth in SHOWN.items():
         np.testing.assert_allclose(said[field][-1], truth, rtol=within, err_msg=field)
         assert name == "axle_forces" or bool(getattr(said.known, field)[-1])
@@ -125,6 +127,34 @@ def test_tyres_that_bend_have_the_slope_at_zero_slip_however_hard_a_car_is_drive
     for name, true in SHOWN.items():
         assert getattr(found.known, name)[-1], name
         np.testing.assert_allclose(found[name][-1], true, rtol=0.05, err_msg=name)
+
+
+@pytest.mark.parametrize("friction", [0.35, 0.6])
+def test_axles_that_bend_early_on_a_slippery_road_are_not_taken_for_soft_ones(friction):
+    channels = drive(curve=magic, most=0.04 * friction, friction=friction, noise=1.0, lean=0.059)
+    found = estimated("walking", channels)
+    for name, true in SHOWN.items():
+        assert getattr(found.known, name)[-1], name
+        np.testing.assert_allclose(found[name][-1], true, rtol=0.05, err_msg=name)
+
+
+def test_with_torques_the_stiffnesses_are_those_of_the_cars_mass():
+    """The file lacks a load of a sixth of the mass; the car turns as one with softer axles and no load would."""
+    light = dataclasses.replace(CAR, mass=CAR.mass / 1.2, yaw_inertia=CAR.yaw_inertia / 1.2)
+    turned = drive(noise=1.0, lean=0.059, curve=magic)
+    needs = stiffness.METHODS["weighed"].make(light).needs
+    log = pushed(needs, mass=CAR.mass, grade=0.0, rows=len(T))
+    channels = {name: np.asarray(log[name]) for name in log.names} | turned
+    told, alone = (estimated(name, channels, light) for name in ("weighed", "walking"))
+    silent = estimated("weighed", {n: v for n, v in channels.items() if not n.endswith("torque")}, light)
+    for name, true in SHOWN.items():
+        np.testing.assert_allclose(told[name][-1], true, rtol=0.05, err_msg=name)
+        np.testing.assert_allclose(alone[name][-1], true / 1.2, rtol=0.07, err_msg=name)
+        assert abs(told[name][-1] - true) < 2.0 * getattr(told.std, name)[-1]
+        np.testing.assert_allclose(silent[name], alone[name], rtol=1e-9)
+        np.testing.assert_allclose(getattr(silent.std, name), getattr(alone.std, name), rtol=1e-3)
+    without = stiffness.METHODS["weighed"].make(dataclasses.replace(light, wheel_radius=None))
+    assert type(without) is type(stiffness.METHODS["walking"].make(light))
 
 
 @pytest.mark.full

@@ -16,7 +16,7 @@ from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.joint import JOINT
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import answer
-from jaxveh.estimators.pulling import OF_THE_CAR, WIDEST_MASS
+from jaxveh.estimators.pulling import OF_THE_TORQUES, WIDEST_MASS
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -107,7 +107,7 @@ class AbstractRatio(AbstractMotionMethod):
         mean_square = (residual + jnp.square(RESIDUAL)) / (memory.age + 1.0)
         variance = jnp.maximum(mean_square, jnp.square(RESIDUAL)) * 2.0 * self.lasting / (start + gathered)
         mass = product / square
-        std = mass * numerics.sqrt(variance + jnp.square(OF_THE_CAR))
+        std = mass * numerics.sqrt(variance + jnp.square(OF_THE_TORQUES))
         return memory, answer({"mass": mass}, {"mass": std}, known=std < WIDEST_MASS * mass)
 
     def _start(self):

@@ -11,12 +11,19 @@ from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate
 from jaxveh.estimators.stiffness.least_squares import AxleForces, Derivatives
 from jaxveh.estimators.stiffness.single_track import Followed, linear_car
 from jaxveh.estimators.stiffness.walking import WalkingStiffness
+from jaxveh.estimators.stiffness.weighed import weighed_stiffness
 
 NAME = "stiffness"
 
 SHOWN = {"front_cornering_stiffness": "N/rad", "rear_cornering_stiffness": "N/rad"}
 
 METHODS = {
+    "weighed": MethodOfCar(
+        weighed_stiffness,
+        "the filter `walking`, with the mass that a filter of grade and mass finds where a log has torques, and the car's file "
+        "a wheel_radius; known only after half a minute of steering",
+        "section 3.1.2.2, references [46, 47]",
+    ),
     "walking": MethodOfCar(
         lambda car: WalkingStiffness(linear_car(car), Followed()),
         "Kalman filter of a linear single track with stiffnesses as slow states, offsets, lean and satellite course; known only "
@@ -36,7 +43,7 @@ METHODS = {
     ),
 }
 
-RECOMMENDED = "walking"
+RECOMMENDED = "weighed"
 
 do_nothing = constant_of(
     NAME, lambda car: {name: getattr(car, name) for name in SHOWN}, "The stiffnesses of the car's file."

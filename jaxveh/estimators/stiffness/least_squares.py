@@ -101,7 +101,11 @@ class AxleForces(AbstractLeastSquares):
 
     def _start(self):
         return jnp.diag(
-            jnp.square(jnp.stack([self.spread, self.spread, 0.003 + 0.0 * self.spread, 0.01 + 0.0 * self.spread]))
+            jnp.square(
+                jnp.stack(
+                    [self.spread, self.spread, jnp.full_like(self.spread, 0.003), jnp.full_like(self.spread, 0.01)]
+                )
+            )
         )
 
     def say(self, memory):

@@ -1,4 +1,4 @@
-"""The recommended method: stiffnesses as random-walk states of a linear single track, with offsets and satellite course."""
+"""Stiffnesses as random-walk states of a single track whose axles bend, with offsets and satellite course."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractSmoothable, answer
 from jaxveh.estimators.misfit import Misfit, learn_misfit, no_misfit
@@ -17,10 +17,10 @@ from jaxveh.estimators.stiffness.single_track import LEAN, Followed, LinearCar, 
 from jaxveh.estimators.two_axles import LATERAL, LOWEST
 from jaxveh.vehicles import GRAVITY
 
-STATES = 10
+STATES = 11
 """Number of states: v_y (m/s), yaw rate (rad/s), ln of both stiffnesses over the file's, offsets of steer (rad), a_y (m/s^2) and
-yaw rate (rad/s), relative increase of the measured a_y because the body leans, yaw (rad), and error of the delay between inertial
-sensors and steer (s)."""
+yaw rate (rad/s), relative increase of the measured a_y because the body leans, yaw (rad), error of the delay between inertial
+sensors and steer (s), and ln of the axles' grip (their largest lateral force over load)."""
 
 SATELLITE = (Need("course", "rad", optional=True),)
 
@@ -37,8 +37,14 @@ cars, whatever the filter's own standard deviation. This standard deviation of l
 driving with a course; in as much as `FORGOTTEN` s without one it returns."""
 
 
-OF_THE_CAR = 0.04
-"""Relative standard deviation of a stiffness by errors of mass, inertia and lengths in the car's file, which no drive shows."""
+TRAIL = 0.011
+"""The pneumatic trail over the wheelbase: some 9 % of the wheel's radius (QDZ1 of public property files: 6 to 14 %)."""
+
+OF_THE_MASS = 0.04
+"""Relative standard deviation of a stiffness by an error of the mass in the car's file."""
+
+OF_THE_LENGTHS = 0.03
+"""Relative standard deviation of a stiffness by errors of lengths, inertia and trail, which no drive shows."""
 
 
 class WalkMemory(NamedTuple):
@@ -54,23 +60,25 @@ class WalkMemory(NamedTuple):
 
 
 class WalkingStiffness(AbstractSmoothable):
-    """An extended Kalman filter of [v_y, yaw rate, ln C_f, ln C_r, offsets of steer, a_y and yaw rate, lean, yaw, delay].
+    """An extended Kalman filter of [v_y, yaw rate, ln C_f, ln C_r, offsets of steer, a_y and yaw rate, lean, yaw, delay,
+    ln grip].
 
-    The model is the single track with the file's mass, inertia and lengths, and axles that bend as those of a dry road do
-    (`grip`, -: their largest lateral force over load): driven with a_y of 3 m/s^2 RMS, linear ones would be found a tenth
-    too soft. The measurements are yaw rate, lateral acceleration and, if the log has it, the satellites'
+    The model is the single track with the file's mass, inertia and lengths. Its axles bend: driven with a_y of 3 m/s^2 RMS,
+    linear ones would be found a tenth too soft, on a slippery road a third. Their `grip` (-: largest lateral force over load) is
+    a state, since the road's friction is unknown. Lateral forces act behind the wheels' centres by a pneumatic `trail` (-, over
+    the wheelbase). The measurements are yaw rate, lateral acceleration and, if the log has it, the satellites'
     `course = yaw + v_y / v` (references [46, 47]), the only one that depends directly on the sideslip. It is delayed by
     `course_delay` (s) against the inertial sensors; the filter adds its change since, the integral of a_y / v. Errors that
     could be mistaken for stiffness are states of their own: offsets, and the body's lean, which increases the measured
-    acceleration. Where axles bend (`linear`, m/s^2 of lateral acceleration), measurements count less and less. On a slippery
-    road they bend sooner, and look soft. By how much the measurements are noisier than below is learned, their `Misfit`.
+    acceleration. Beyond a share of the grip (`linear`, -) measurements count less and less. By how much they are noisier than
+    below is learned, their `Misfit`.
 
     Without a course a stiffness is not known (`BLIND`), and a noisy one counts for less.
 
-    `spread` (-): standard deviation of ln C before the drive, `walk` (1/sqrt(s)): its random walk; `v_y_noise` (m/s^1.5),
-    `yaw_noise` (rad/s^1.5); `a_y_noise` (m/s^2), `yaw_rate_noise` (rad/s), `course_noise` (m/s, lateral); `steer_noise`
-    (rad/sqrt(s)): random walk of the steer's offset, play included; `known_spread` (-): up to this standard deviation of ln C a
-    stiffness is known.
+    `spread`, `grip_spread` (-): standard deviations of ln C and ln grip before the drive, `walk`, `grip_walk` (1/sqrt(s)): their
+    random walks; `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5); `a_y_noise` (m/s^2), `yaw_rate_noise` (rad/s), `course_noise`
+    (m/s, lateral); `steer_noise` (rad/sqrt(s)): random walk of the steer's offset, play included; `known_spread` (-): up to this
+    standard deviation of ln C a stiffness is known.
     """
 
     car: LinearCar
@@ -84,9 +92,12 @@ class WalkingStiffness(AbstractSmoothable):
     steer_noise: jax.Array = positive("rad/sqrt(s)", default=2e-4)
     course_noise: jax.Array = positive("m/s", default=0.07)
     course_delay: jax.Array = positive("s", default=0.125)
-    linear: jax.Array = positive("m/s^2", default=4.0)
+    linear: jax.Array = positive("-", default=0.37)
     grip: jax.Array = positive("-", default=1.1)
-    known_spread: jax.Array = positive("-", default=0.07)
+    trail: jax.Array = parameter("-", scale=0.01, default=TRAIL)
+    grip_spread: jax.Array = positive("-", default=0.5)
+    grip_walk: jax.Array = positive("1/sqrt(s)", default=0.1)
+    known_spread: jax.Array = positive("-", default=0.075)
 
     @property
     def needs(self):
@@ -94,7 +105,7 @@ class WalkingStiffness(AbstractSmoothable):
 
     def first(self, t, values):
         signals = self.followed.start(t, values)
-        mean = jnp.zeros((STATES,), self.spread.dtype).at[7].set(LEAN)
+        mean = jnp.zeros((STATES,), self.spread.dtype).at[7].set(LEAN).at[10].set(jnp.log(self.grip))
         zero = jnp.zeros_like(t)
         memory = WalkMemory(signals, Belief(mean, self._start()), zero, zero + 1e3, zero, no_misfit(3, t))
         return memory, self.say(memory)
@@ -105,7 +116,7 @@ class WalkingStiffness(AbstractSmoothable):
         share = 1.0 - jnp.exp(-2.0 * dt / self.course_delay)
         turning = memory.turning + share * (now.a_y / (1.0 + LEAN) / v_x - memory.turning)
         start = belief = self.ahead(memory, t, values)
-        rough = 1.0 + jnp.square(jnp.square(now.a_y / self.linear))
+        rough = 1.0 + jnp.square(jnp.square(now.a_y / (self.linear * GRAVITY * _grip(belief.mean))))
         felt = lambda x: self._forces(x, now)[2] * (1.0 + x[7]) + x[5]
         seen = lambda x: x[8] + x[0] / v_x
         expected = (lambda x: x[1] + x[6]), felt, seen
@@ -141,9 +152,8 @@ class WalkingStiffness(AbstractSmoothable):
         return jnp.clip(t - memory.signals.t, 0.0, 1.0), self.followed.next(memory.signals, t, values)
 
     def _start(self):
-        soft = self.spread
-        spreads = [0.3, 0.1, None, None, 0.002, 0.15, 0.005, 0.06, 3.0, 0.01]
-        return jnp.diag(jnp.square(jnp.stack([soft if s is None else s + 0.0 * soft for s in spreads])))
+        spreads = (0.3, 0.1, self.spread, self.spread, 0.002, 0.15, 0.005, 0.06, 3.0, 0.01, self.grip_spread)
+        return jnp.diag(jnp.square(jnp.stack([numerics.as_wide_as(spread, self.spread) for spread in spreads])))
 
     def _standing(self, P):
         """The covariance at standstill, where only that of the constants is kept."""
@@ -161,7 +171,7 @@ class WalkingStiffness(AbstractSmoothable):
         front = front * (steer - car.steer_offset - x[4] - (x[0] + car.front_axle_to_cg * x[1]) / v_x)
         rear = -rear * (x[0] - car.rear_axle_to_cg * x[1]) / v_x
         length = car.front_axle_to_cg + car.rear_axle_to_cg
-        grips = (self.grip * car.mass * GRAVITY / length * arm for arm in (car.rear_axle_to_cg, car.front_axle_to_cg))
+        grips = (_grip(x) * car.mass * GRAVITY / length * arm for arm in (car.rear_axle_to_cg, car.front_axle_to_cg))
         front, rear = (_bent(force, grip) for force, grip in zip((front, rear), grips, strict=True))
         return front, rear, (front + rear) / car.mass
 
@@ -170,28 +180,38 @@ class WalkingStiffness(AbstractSmoothable):
 
         def rates(x):
             front, rear, push = self._forces(x, now)
-            turn = (car.front_axle_to_cg * front - car.rear_axle_to_cg * rear) / car.yaw_inertia
+            trail = self.trail * (car.front_axle_to_cg + car.rear_axle_to_cg)
+            turn = ((car.front_axle_to_cg - trail) * front - (car.rear_axle_to_cg + trail) * rear) / car.yaw_inertia
             return jnp.stack([push - now.v_x * x[1], turn])
 
         change, slopes = implicit_step(rates, x, dt)
         step = jnp.eye(STATES, dtype=x.dtype).at[:2].add(slopes).at[8, 1].set(dt)
-        slow = 0.0 * dt
-        walks = jnp.stack([
-            self.v_y_noise, self.yaw_noise, self.walk, self.walk, self.steer_noise, 0.002 + slow, 1e-5 + slow, 1e-4 + slow,
-            2e-3 + slow, 1e-5 + slow,
-        ])  # fmt: skip
+        walks = (
+            self.v_y_noise, self.yaw_noise, self.walk, self.walk, self.steer_noise, 0.002, 1e-5, 1e-4, 2e-3, 1e-5,
+            self.grip_walk,
+        )  # fmt: skip
         moved = x.at[:2].add(change).at[8].add(dt * x[1])
-        return Belief(moved, step @ belief.covariance @ step.T + jnp.diag(jnp.square(walks) * dt))
+        noise = jnp.diag(jnp.stack([jnp.square(walk) * dt for walk in walks]))
+        return Belief(moved, step @ belief.covariance @ step.T + noise)
 
     def say(self, memory):
+        return self.answer_for(memory, 1.0, OF_THE_MASS)
+
+    def answer_for(self, memory: WalkMemory, heavier: Any, of_the_mass: Any):
+        """The answer for a car whose mass is `heavier` (-) times that of the file, with this relative standard deviation."""
         now, (x, P) = memory.signals, memory.belief
         blind = BLIND * jnp.exp(-memory.guided / GUIDED)
-        std = jnp.sqrt(jnp.diagonal(P)[2:4] + jnp.square(blind) + OF_THE_CAR**2)
+        std = jnp.sqrt(jnp.diagonal(P)[2:4] + jnp.square(blind) + jnp.square(of_the_mass) + OF_THE_LENGTHS**2)
         file = (self.car.front_cornering_stiffness, self.car.rear_cornering_stiffness)
         names = ("front_cornering_stiffness", "rear_cornering_stiffness")
-        mean = {name: file[k] * jnp.exp(jnp.clip(x[2 + k], -1.6, 1.6)) for k, name in enumerate(names)}
+        mean = {name: heavier * file[k] * jnp.exp(jnp.clip(x[2 + k], -1.6, 1.6)) for k, name in enumerate(names)}
         known = {name: now.moves & (std[k] < self.known_spread) for k, name in enumerate(names)}
         return answer(mean, {name: mean[name] * std[k] for k, name in enumerate(names)}, known)
+
+
+def _grip(x: Any) -> Any:
+    """The grip of both axles; between ice and racing tyres with downforce, so that the exponential stays finite."""
+    return jnp.exp(jnp.clip(x[10], -3.0, 1.0))
 
 
 def _bent(force: Any, grip: Any) -> Any:

@@ -158,7 +158,7 @@ PARAMETERS = (
     ),
     system("cornering stiffness by least squares", "3.1.2.2, eq 15 [120]", *ways("stiffness", "axle_forces")),
     system("cornering stiffness by derivatives", "3.1.2.2, eq 16 [122]", *ways("stiffness", "derivatives")),
-    system("cornering stiffness with satellites", "3.1.2.2 [46, 47]", *ways("stiffness", "walking")),
+    system("cornering stiffness with satellites", "3.1.2.2 [46, 47]", *ways("stiffness", "weighed", "walking")),
     system("bank by a disturbance observer", "3.1.2.3 [125]", *ways("bank", "disturbance_observer")),
     system("bank as an unknown input", "3.1.2.3 [126]", *ways("bank", "unknown_input")),
     system("bank by Tseng's rule", "3.1.2.3 [123]", *ways("bank", "tseng")),
