@@ -153,12 +153,17 @@ def follow_all(method_of_car, cases, time):
     """What methods of one structure say of cases (car, channels): answers with (cases, rows) in each field."""
     methods = [method_of_car(car) for car, _ in cases]
     numbers = [eqx.partition(method, eqx.is_array) for method in methods]
-    rest = numbers[0][1]
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[leaves for leaves, _ in numbers])
     nothing = np.full(len(time), np.nan)
     values = {
         need.channel: jnp.stack([jnp.asarray(channels.get(need.channel, nothing)) for _, channels in cases])
         for need in methods[0].needs
     }
-    run = lambda leaves, values: kit.follow_rows(eqx.combine(leaves, rest), jnp.asarray(time), values)
-    return jax.tree.map(np.asarray, eqx.filter_jit(jax.vmap(run))(stacked, values))
+    return jax.tree.map(np.asarray, _followed(eqx.combine(stacked, numbers[0][1]), jnp.asarray(time), values))
+
+
+@eqx.filter_jit
+def _followed(methods, time, values):
+    """Compiled once for methods of one structure and as many cases and rows."""
+    follow = eqx.filter_vmap(kit.follow_rows, in_axes=(eqx.if_array(0), None, 0))
+    return follow(methods, time, values)
