@@ -41,13 +41,15 @@ class FirstStage(NamedTuple):
     resampled: Any
     alive: Any
 
-    def weigh(self, log_n, drawn, plain, oftener, lost) -> SecondStage:
+    def weigh(self, log_n, drawn, plain, judged, lost) -> SecondStage:
         """The second stage. `log_n`: the logarithm of the number of particles before the step, which with an adaptive number may
         differ from that of this step; log weights (N,): `drawn` after a draw of ancestors, `plain()` without one (an ordinary
         importance step from the weights before, which has their number: not called where ancestors are always drawn);
-        `oftener` (N,): by how much more often than by its weight each particle's ancestor was drawn, as a logarithm; which
-        particles are `lost`."""
+        `judged` (N,): the log look-ahead of each particle's ancestor, None where ancestors are drawn by their weights alone;
+        which particles are `lost`."""
         log_first = self.log_mean
+        # By how much more often than by its weight each ancestor was drawn, as a logarithm.
+        oftener = jnp.zeros_like(drawn) if judged is None else judged - (log_first + log_n)
         if self.resampled is not None:
             drawn = jnp.where(self.resampled, drawn, plain())
             log_first = jnp.where(self.resampled, log_first, -log_n)
@@ -87,9 +89,7 @@ class LookedAhead(AbstractAhead):
         log_n = jnp.log(jnp.asarray(before.weights.shape[0], logs.dtype))
         drawn = logs - chosen_ahead + log_chosen(filter_, log_of(stage.weights), stage.ancestors)
         plain = lambda: logs + log_of(before.weights) + log_n
-        weights, total, alive, remark = stage.weigh(
-            log_n, drawn, plain, chosen_ahead - (stage.log_mean + log_n), self.lost
-        )
+        weights, total, alive, remark = stage.weigh(log_n, drawn, plain, chosen_ahead, self.lost)
         found = ParticleBelief(self.particles, weights, stage.ancestors, before.key, row.t, row.u, before.count + 1)
         within = _scatter(model, after, gather(self.residual, stage.ancestors))
         both, became = (before.weights, weights), fate(alive, self.lost)

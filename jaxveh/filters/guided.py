@@ -93,11 +93,10 @@ class Proposed(AbstractAhead):
         _, residual = log_prob(model, row, self.moved)
         kept = log_chosen(filter_, log_of(stage.weights), stage.ancestors)
         log_n = jnp.log(jnp.asarray(before.weights.shape[0], after.dtype))
-        chosen_ahead = stage.ahead[stage.ancestors]
-        drawn = after + self.ratio + kept - (chosen_ahead if filter_.auxiliary else 0.0)
+        judged = stage.ahead[stage.ancestors] if filter_.auxiliary else None
+        drawn = after + self.ratio + kept - (0.0 if judged is None else judged)
         plain = lambda: after + self.ratio + without(self.lost, log_of(before.weights)) + log_n
-        oftener = chosen_ahead - (stage.log_mean + log_n) if filter_.auxiliary else jnp.zeros_like(after)
-        weights, total, alive, remark = stage.weigh(log_n, drawn, plain, oftener, self.astray)
+        weights, total, alive, remark = stage.weigh(log_n, drawn, plain, judged, self.astray)
         found = ParticleBelief(self.particles, weights, stage.ancestors, before.key, row.t, row.u, before.count + 1)
         within = mean_variances(model, before.weights, self.variances)
         about, became = (before.weights, weights), fate(alive, self.lost)

@@ -99,8 +99,8 @@ def linear_recording(model, rows=40, seed=1):
 def kalman(model, recording):
     """The exact answer in NumPy: log-likelihood increments, means, covariances, innovations, their spread, NIS."""
     A, B, H, D = (np.asarray(model.system[k]) for k in "ABHD")
-    Q = np.asarray(model.process_noise.law.matrix)
-    R = np.asarray(model.measurement_noise.matrix)
+    Q = np.asarray(model.process_noise.law.covariance())
+    R = np.asarray(model.measurement_noise.covariance())
     t, u = np.asarray(recording.time), np.asarray(recording["force"])
     y = np.stack([np.asarray(recording[name]) for name in model.channels], axis=1)
     x, P = np.array([float(v) for v in model.prior.mean]), np.asarray(model.prior.covariance())

@@ -246,8 +246,8 @@ def test_the_second_stage_weighs_by_hand(resampled):
     stage = FirstStage(
         None, None, jnp.asarray(log_mean), None, None if resampled is None else jnp.asarray(resampled), True
     )
-    weigh = lambda stage: stage.weigh(
-        jnp.asarray(log_n), jnp.asarray(drawn), lambda: jnp.asarray(plain), jnp.zeros(4), jnp.asarray(lost)
+    weigh = lambda stage, judged=None: stage.weigh(
+        jnp.asarray(log_n), jnp.asarray(drawn), lambda: jnp.asarray(plain), judged, jnp.asarray(lost)
     )
     found = weigh(stage)
     mass = np.where(lost, 0.0, np.exp(plain if resampled is False else drawn))
@@ -256,6 +256,11 @@ def test_the_second_stage_weighs_by_hand(resampled):
     np.testing.assert_allclose(found.log_likelihood, first + np.log(mass.mean()), rtol=1e-12)
     assert bool(found.alive) and int(found.remark) == Result.successful
     assert not bool(weigh(stage._replace(alive=jnp.asarray(False))).alive)
+    # A look-ahead misled if ancestors were drawn half as often as by their weights, by what it says over the weights' sum.
+    for share in (0.49, 0.51):
+        judged = jnp.full(4, np.log(share) + log_mean + log_n)
+        misled = resampled is not False and share < 0.5
+        assert (int(weigh(stage, judged).remark) == Result.lookahead_misled) == misled
 
 
 @pytest.mark.parametrize(("threshold", "chooses"), [(0.0, False), (0.8, False), (0.9, True), (1.0, True)])

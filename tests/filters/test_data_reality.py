@@ -37,6 +37,19 @@ def kalman_in_order(rows):
 OUT_OF_ORDER = filters.Delayed(filters.Kalman(), depth=6)
 
 
+def in_its_own_place(log, delay):
+    """The log whose `y1` is `delay` late, with every value at the time at which it was measured.
+
+    A late value that is missing makes no row: the model's steps of Euler must be the same, by the input of the row before."""
+    stamps = np.concatenate([log.time, log.time - delay])
+    nothing, (y0, y1, force) = np.full(len(log.time), np.nan), (np.asarray(log[name]) for name in ("y0", "y1", "force"))
+    held = force[np.clip(np.searchsorted(log.time, stamps, "right") - 1, 0, None)]
+    both = {"y0": np.append(y0, nothing), "y1": np.append(nothing, y1), "force": held}
+    said = np.append(np.isfinite(log.time), np.isfinite(y1) & (log.time >= delay))
+    order = [k for k in np.argsort(stamps, kind="stable") if said[k]]
+    return Recording(stamps[order], {name: values[order] for name, values in both.items()})
+
+
 class TestDelayed:
     def test_rows_out_of_order_give_what_rows_in_order_give(self):
         order = list(range(30))
@@ -58,40 +71,34 @@ class TestDelayed:
         rng = np.random.default_rng(3)
         y0, y1, delay = rng.normal(size=24), rng.normal(size=24), 0.25
         y1[::3] = np.nan
-        force = np.full(24, 0.7)
-        arriving = Recording(time, {"y0": y0, "y1": y1, "force": force})
-        stamps = np.concatenate([time, time - delay])
-        order = np.argsort(stamps, kind="stable")
-        nothing = np.full(24, np.nan)
-        whole = {
-            "y0": np.concatenate([y0, nothing])[order],
-            "y1": np.concatenate([nothing, y1])[order],
-            "force": np.full(48, 0.7),
-        }
-        # Rows without a value are no rows: the model's steps of Euler must be the same.
-        said = np.isfinite(whole["y0"]) | np.isfinite(whole["y1"])
-        keep = (stamps[order] >= 0) & said
-        own = Recording(stamps[order][keep], {name: values[keep] for name, values in whole.items()})
-        expected = kalman_in_order(jax.tree.map(np.asarray, MODEL.rows(own)))
+        arriving = Recording(time, {"y0": y0, "y1": y1, "force": np.full(24, 0.7)})
+        expected = kalman(MODEL, in_its_own_place(arriving, delay))
         filter_ = filters.Delayed(filters.Kalman(), {"y1": delay}, depth=8)
         found = filters.run(filter_, MODEL, arriving)
-        np.testing.assert_allclose(found.log_likelihood, expected.log_likelihood, rtol=1e-11)
-        np.testing.assert_allclose([m[-1] for m in found.mean], [m[-1] for m in expected.mean], rtol=1e-9)
+        np.testing.assert_allclose(found.log_likelihood, expected["log_likelihood"].sum(), rtol=1e-11)
+        np.testing.assert_allclose([m[-1] for m in found.mean], expected["mean"][-1], rtol=1e-9)
         shown = np.asarray(found.info.innovation.y1)
         np.testing.assert_array_equal(np.isfinite(shown[3:]), np.isfinite(y1[3:]))
         # Of rows that come five times as fast, more than are kept come before it.
         with pytest.raises(FilterError, match="older than the rows that are kept"):
             filters.run(filter_, MODEL, Recording(0.2 * time, dict(arriving.channels)))
 
-    def test_a_channel_without_a_new_value_has_no_innovation(self):
-        """In the row of a late value, rows that were already told are filtered anew."""
+    def test_values_that_are_late_in_rows_that_are_late_count_at_their_own_time(self):
+        """And in the row of a late value, rows that were already told are filtered anew: they have no innovation again."""
         time = np.arange(8) * 0.1
         y0, y1 = np.sin(time), np.cos(time)
         y0[5], y1[6] = np.nan, np.nan
-        log = Recording(time, {"y0": y0, "y1": y1, "force": np.full(8, 0.7)})
-        info = filters.run(filters.Delayed(filters.Kalman(), {"y1": 0.15}, depth=6), MODEL, log).info
-        for shown, told in ((info.innovation.y0, y0), (info.innovation_std.y0, y0), (info.innovation.y1, y1)):
-            np.testing.assert_array_equal(np.isfinite(shown[2:]), np.isfinite(told[2:]))
+        log = Recording(time, {"y0": y0, "y1": y1, "force": 0.7 + time})
+        filter_, rows = filters.Delayed(filters.Kalman(), {"y1": 0.15}, depth=9), MODEL.rows(log)
+        exact = kalman(MODEL, in_its_own_place(log, 0.15))
+        for order in (np.arange(8), [0, 1, 3, 2, 4, 6, 5, 7]):
+            found = filters.scan(filter_, MODEL, taken(rows, order))
+            assert not int(found.result)
+            np.testing.assert_allclose(found.log_likelihood, exact["log_likelihood"].sum(), rtol=1e-11)
+            np.testing.assert_allclose([m[-1] for m in found.mean], exact["mean"][-1], rtol=1e-9)
+            for shown, told in ((found.info.innovation, y0), (found.info.innovation_std, y0)):
+                np.testing.assert_array_equal(np.isfinite(shown.y0[2:]), np.isfinite(told[order][2:]))
+                np.testing.assert_array_equal(np.isfinite(shown.y1[2:]), np.isfinite(y1[order][2:]))
 
     def test_gradients_are_finite_where_a_delayed_value_is_from_before_the_first_row(self):
         """It is left out, and with it a step back in time that nobody takes."""

@@ -25,7 +25,7 @@ def rauch_tung_striebel(filter: AbstractGaussianFilter, model: StateSpace, rows:
     A long log is smoothed in pieces (`numerics.there_and_back`), which takes less memory and gives the same numbers except for
     rounding.
     """
-    if numerics.pieces_of(len(rows.t) - 1) > 1:
+    if numerics.pieces_of(len(rows.t)) > 1:
         return smooth_in_pieces(filter, model, rows, ALONE)
     return kit.in_form_for_batches(_smoothed_in_form, filter, model, rows)
 
@@ -40,7 +40,7 @@ def smooth_together(
     (...). A long log is smoothed in pieces, so that `joined` sees a piece at a time, and no more than the result is kept.
     """
     first = lambda tree: jax.tree.map(lambda leaf: leaf[0] if eqx.is_array(leaf) else leaf, tree)
-    if numerics.pieces_of(len(rows.t) - 1) > 1:
+    if numerics.pieces_of(len(rows.t)) > 1:
         return smooth_in_pieces(filter, models, rows, Runs(eqx.filter_vmap, first, joined))
     found = eqx.filter_vmap(lambda model: rauch_tung_striebel(filter, model, rows))(models)
     return smoothed_estimate(first(models), first(found.filtered), joined((found.mean, found.std)))
