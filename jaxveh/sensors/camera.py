@@ -82,7 +82,8 @@ class LaneCamera(AbstractSignalInstrument):
         silent = jnp.zeros(times.shape, bool)
         if self.reach is not None:
             silent = jnp.abs(offset) > self.reach
-        if self.loss_rate is not None and self.loss_length is not None:
+        if self.loss_rate is not None:
+            assert self.loss_length is not None  # both or neither
             lost = on_and_off(subkey(key, _LOST), times.shape[0], self.loss_rate, self.loss_length, self.period)
             silent = silent | lost
         return {name: jnp.where(silent, jnp.nan, value) for name, value in said.items()}

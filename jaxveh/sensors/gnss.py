@@ -103,7 +103,8 @@ class GNSS(AbstractInstrument):
         if self.climb is not None:
             said["climb_rate"] = self.climb.apply(rise(outputs), self.period, subkey(key, _CLIMB))
         silent = inside(times, self.outages)
-        if self.outage_rate is not None and self.outage_length is not None:
+        if self.outage_rate is not None:
+            assert self.outage_length is not None  # both or neither
             random = on_and_off(
                 subkey(key, _OUTAGES), times.shape[0], self.outage_rate, self.outage_length, self.period
             )

@@ -153,6 +153,45 @@ def test_mistakes_within_a_method(mistake):
         estimators.state_space(car, sensors.esc(yaw_rate=0.005, a_y=0.1))
 
 
+def device(units=None, said=lambda times: {"q": times, "p": times}):
+    """A device of one's own that measures `q` and `p`."""
+    made = {
+        "rate": 10.0, "delay": 0.0, "phase": 0.0, "__module__": __name__, "channels": property(lambda self: ("q", "p")),
+        "units": property(lambda self: {"q": "-", "p": "m"} if units is None else units),
+        "needs": property(lambda self: ("v_x",)), "may_use": property(lambda self: ()),
+        "say": lambda self, times, outputs, key: said(times),
+    }  # fmt: skip
+    return type(sensors.AbstractDevice)("Own", (sensors.AbstractDevice,), made)()
+
+
+SAID = {
+    "a channel too few": (
+        lambda t: {"q": t},
+        "Own.say: returned q: must return all these channels and no others: q, p",
+    ),
+    "one too many": (lambda t: {"q": t, "p": t, "r": t}, "Own.say: returned q, p, r: must return all these"),
+    "none": (lambda t: {}, "Own.say: returned nothing: must return all these"),
+    "no mapping": (lambda t: [t, t], "Own.say: returned .*list.*: must return a mapping from channels to arrays"),
+    "one number": (lambda t: {"q": t, "p": t[0]}, r"Own.say: p is .*: must be an array \(4,\), a number for each time"),
+}
+
+
+@pytest.mark.parametrize("mistake", SAID)
+def test_a_device_of_one_s_own_says_an_array_for_each_channel(mistake):
+    said, words = SAID[mistake]
+    with pytest.raises(InputError, match=words):
+        device(said=said).say(jnp.zeros(4), {"v_x": jnp.zeros(4)}, None)
+
+
+@pytest.mark.parametrize(
+    ("units", "lacking"), [({"q": "-"}, "p"), ({}, "q, p"), ({"r": "-", "p": "m"}, "q"), ([], "q, p")]
+)
+def test_a_device_of_one_s_own_has_a_unit_for_each_channel(units, lacking):
+    assert device().units == {"q": "-", "p": "m"}
+    with pytest.raises(InputError, match=f"Own.units: has no {lacking}: each channel must have a unit"):
+        device(units=units).units  # noqa: B018
+
+
 def test_a_sound_class_answers_a_batch_and_its_derivatives():
     law = tyre(lambda self, contact, state=None: tyres.Forces(F_y=self.c * jnp.tanh(contact.slip_angle)))
     angles = jnp.linspace(-0.1, 0.1, 5)
