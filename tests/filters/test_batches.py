@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from test_every_filter import FILTERS, MODELS, recordings
 
-from jaxveh import InputError, Result, filters
+from jaxveh import Result, filters
 from jaxveh.filters.smoothing.parallel import parallel_smoother
 from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
 from jaxveh.statespace import Info, Smoothing, kit
@@ -227,11 +227,6 @@ def test_an_estimate_keeps_what_it_is_asked_to(keep):
         same(getattr(part.info, name), getattr(whole.info, name), 0.0, 0.0)
     if part.info is not None:
         assert all(getattr(part.info, name) is None for name in set(Info._fields) - set(fields))
-
-
-def test_what_cannot_be_kept_is_named():
-    with pytest.raises(InputError, match="keep = 'means': must be one of 'mean', 'std', 'info', "):
-        filters.run(filters.Extended(), MODELS["linear"](), recordings("linear")[0], keep=("means",))
 
 
 def test_remarks_are_told_though_nothing_is_kept():

@@ -103,3 +103,8 @@ MAPPINGS = {
 def test_what_is_given_by_name_is_a_mapping_or_several(name, wrong):
     with pytest.raises(InputError, match=name):
         MAPPINGS[name](wrong)
+
+
+def test_what_cannot_be_kept_is_named():
+    with pytest.raises(InputError, match="keep = 'means': must be one of 'mean', 'std', 'info', "):
+        run(filters.Extended(), linear(), recordings("linear")[0], keep=("means",))
