@@ -1,6 +1,7 @@
 """One step of every particle filter is importance sampling: ancestors, moves and weights beside the densities in NumPy."""
 
 import dataclasses
+import functools
 
 import jax
 import numpy as np
@@ -47,20 +48,27 @@ def test_every_filter_that_draws_ancestors_is_here():
     assert not wanting(drawn, {name.partition(",")[0] for name in FILTERS} | set(OTHERS), {})
 
 
+FIRST, ROW = (jax.tree.map(lambda leaf, k=k: leaf[k], ROWS) for k in (0, 1))
+
+
+@functools.cache
+def first_belief(name):
+    return jax.jit(lambda: FILTERS[name]().init(MODEL, FIRST, KEY)[0])()
+
+
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", FILTERS)
 def test_weights_are_densities_over_chances(name, way):
     filter_ = FILTERS[name](**WAYS[way])
-    first, row = (jax.tree.map(lambda leaf, k=k: leaf[k], ROWS) for k in (0, 1))
-    belief, _ = filter_.init(MODEL, first, KEY)
+    belief = first_belief(name)
     before, w = np.asarray(belief.particles.level), np.asarray(belief.weights)
-    predicted = filter_._predict(MODEL, belief, row)
-    after, info = filter_.step(MODEL, belief, row)
+    step = lambda belief: (filter_._predict(MODEL, belief, ROW), *filter_.step(MODEL, belief, ROW))
+    predicted, after, info = jax.jit(step)(belief)
     x, chosen = np.asarray(after.particles.level), np.asarray(after.ancestors)
     chances = np.asarray(predicted.stage.weights) if hasattr(predicted, "stage") else w
     if way == "softly":
         chances = SHARE * chances + (1.0 - SHARE) / N
-    y, ahead = float(row.y.flow), (1.0 - 0.2 * DT) * before[chosen]
+    y, ahead = float(ROW.y.flow), (1.0 - 0.2 * DT) * before[chosen]
     # A guided move is drawn from p(x | before, y), so that what is left of the densities is p(y | before).
     density = normal(y, ahead, Q * DT + R) if "Guided" in name else normal(y, x, R)
     kept = w if way == "never" else (w / (N * chances))[chosen]

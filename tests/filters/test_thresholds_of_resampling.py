@@ -42,10 +42,11 @@ def test_every_filter_with_a_threshold_has_a_line():
 @pytest.mark.parametrize("name", FILTERS)
 def test_it_resamples_below_its_threshold_alone(name):
     make = FILTERS[name]
-    belief, _ = make().init(MODEL, FIRST, KEY)
-    judged = make()._predict(MODEL, belief, NEXT).stage.weights if name == "AuxiliaryParticleFilter" else belief.weights
+    belief = jax.jit(lambda: make().init(MODEL, FIRST, KEY)[0])()
+    judges = jax.jit(lambda belief: make()._predict(MODEL, belief, NEXT).stage.weights)
+    judged = judges(belief) if name == "AuxiliaryParticleFilter" else belief.weights
     share = float(numerics.ess(judged)) / N
     assert 0.1 < share < 0.98
     for threshold, resamples in ((0.99 * share, False), (1.01 * share, True)):
-        after, _ = make(threshold=threshold).step(MODEL, belief, NEXT)
+        after = jax.jit(lambda belief, by=threshold: make(threshold=by).step(MODEL, belief, NEXT)[0])(belief)
         assert np.any(np.asarray(after.ancestors) != np.arange(N)) == resamples
