@@ -16,6 +16,7 @@ from jaxveh import InputError, filters, numerics
 from jaxveh import statespace as ss
 from jaxveh._core.names import record, record_type
 from jaxveh.filters.choosing import log_of, score
+from jaxveh.filters.gaussian.linear import _nonlinear_parts
 from jaxveh.filters.marginalised import _nonlinear_in
 from jaxveh.filters.transport import distances, transport_plan
 
@@ -240,8 +241,12 @@ class TestMarginalised:
             filters.Marginalised(10, ("x0",)).check(model)
 
     def test_a_function_of_the_states_within_is_found_nonlinear_wherever_it_is(self):
-        """At their means, which are zero, the last two seem linear; where all states move alike, the difference."""
+        """At their means, which are zero, the last two seem linear; where all states move alike, the difference. The exact
+        Kalman filter's check of all states finds the same, whatever the units are."""
         functions = {
+            "straight": lambda x: 3.0 * x.a - 0.7 * x.z + 5.0,
+            "huge": lambda x: 1e9 * x.a - 0.3e9 * x.z,
+            "tiny": lambda x: 1e-9 * x.a + 1e-12 * x.a**2,
             "linear": lambda x: x.z**2 * x.a - 3.0 * jnp.sin(x.z) * x.b + 5.0,
             "square": lambda x: x.a**2,
             "product": lambda x: x.a * x.b,
@@ -260,7 +265,14 @@ class TestMarginalised:
         )
         states, channels = _nonlinear_in(("a", "b"), model)
         np.testing.assert_array_equal(states, [False, False, True])
-        np.testing.assert_array_equal(channels, [name != "linear" for name in functions])
+        linear = {name for name, curved in zip(functions, channels, strict=True) if not curved}
+        assert linear == {"straight", "huge", "linear"}
+        for states, channels in _nonlinear_parts(model):
+            np.testing.assert_array_equal(states, [False, False, True])
+            assert {name for name, curved in zip(functions, channels, strict=True) if not curved} == {
+                "straight",
+                "huge",
+            }
         with pytest.raises(InputError, match="state b is not linear in a, b"):
             filters.Marginalised(10, ("a", "b")).check(model)
 

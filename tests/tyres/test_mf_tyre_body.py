@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +13,7 @@ from jaxveh.tyres import Contact, evaluation
 from jaxveh.tyres.evaluation import evaluate
 from jaxveh.tyres.mf_tyre import Structure
 from jaxveh.tyres.mf_tyre.structure import Wheel
+from jaxveh.tyres.mf_tyre.turn_slip import Spin
 
 NUMBERS = {
     "UNLOADED_RADIUS": 0.32, "FNOMIN": 4200.0, "LONGVL": 15.0, "NOMPRES": 210000.0, "INFLPRES": 230000.0, "WIDTH": 0.215,
@@ -193,3 +195,47 @@ def test_a_mode_s_digits_are_the_tyre_s_options(limits, angles, spins):
     tyre = _in_mode(tyres.typical_mf_tyre(4000.0), mode)
     assert (tyre.limits, tyre.angles, tyre.spins) == (limits, angles, spins)
     assert _mode(tyre) == mode
+
+
+def test_the_torque_of_parking_whatever_the_coefficients_are():
+    """Some of the draws are beyond both ends of the arccos; the last two have no torque of their own."""
+    rng = np.random.default_rng(3)
+    draw = lambda low, high: rng.uniform(low, high, 60)
+    load, mu, path, weight, most = (
+        draw(2000.0, 9000.0),
+        draw(0.2, 1.2),
+        draw(-1.0, 1.0),
+        draw(-1.0, 1.0),
+        draw(0.1, 0.4),
+    )
+    at_90, shape, reduction, df_z, camber = (
+        draw(0.1, 4.0),
+        draw(0.5, 1.5),
+        draw(0.0, 0.8),
+        draw(-0.5, 0.5),
+        draw(-0.1, 0.1),
+    )
+    slopes = dict(
+        zip(("QDZ8", "QDZ9", "QDZ10", "QDZ11"), (draw(0.01, 0.3), *(draw(-0.1, 0.1) for _ in "123")), strict=True)
+    )
+    load[-1], path[-2] = 0.0, 0.0
+    spin = Spin(path=path, reduction=reduction, coefficients=SimpleNamespace(QCRP1=most, QCRP2=at_90, QDRP1=shape))
+    given = (
+        SimpleNamespace(moment_load=load, df_z=df_z, camber=camber),
+        SimpleNamespace(LFZO=1.1, LMP=0.9, LKZC=1.2), SimpleNamespace(**slopes), BODY, -mu, weight,
+    )  # fmt: skip
+    torque, zeta_7 = spin.parking(*given)
+    peak = most * mu * N.UNLOADED_RADIUS * load * np.sqrt(load / (1.1 * N.FNOMIN)) * 0.9
+    D = peak / np.sin(0.5 * np.pi * shape)
+    c = SimpleNamespace(**slopes)
+    slope = load * N.UNLOADED_RADIUS * 1.2 * (c.QDZ8 + c.QDZ9 * df_z + (c.QDZ10 + c.QDZ11 * df_z) * np.abs(camber))
+    with np.errstate(all="ignore"):
+        turned = np.where(load > 0.0, slope / (shape * D * (1.0 - reduction)) * path, 0.0)
+        expected = D * np.sin(shape * np.arctan(turned))
+        share = peak * 2.0 / np.pi * np.arctan(at_90 * np.abs(path)) * weight / np.abs(expected)
+    assert (share > 1.0).sum() > 3 and (share < -1.0).sum() > 3 and (np.abs(share) < 1.0).sum() > 20
+    # The law adds a millionth to what it divides by.
+    np.testing.assert_allclose(torque, expected, rtol=1e-6, atol=1e-9)
+    limited = 2.0 / np.pi * np.arccos(np.clip(share, -1.0, 1.0))
+    np.testing.assert_allclose(zeta_7[:-2], limited[:-2], rtol=1e-4, atol=1e-9)
+    np.testing.assert_array_equal(zeta_7[-2:], 1.0)

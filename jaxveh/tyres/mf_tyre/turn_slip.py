@@ -104,7 +104,7 @@ class Spin(NamedTuple):
         """`D_rphi` (N m), the peak of the residual torque due to spin, and its shape zeta_7 (4.93 to 4.103).
 
         The slope in (4.99) is that of the residual torque over camber, `QDZ8 + QDZ9 df_z` (the reference evaluator multiplies
-        the two). The argument of the arccos in zeta_7 is limited to 1.
+        the two). The argument of the arccos in zeta_7 is limited to -1 to 1.
         """
         c, a = self.coefficients, aligning
         R_0, nominal = structure.UNLOADED_RADIUS, scaling.LFZO * structure.FNOMIN
@@ -117,8 +117,9 @@ class Spin(NamedTuple):
         at_90 = most * (2 / math.pi) * numerics.arctan(c.QCRP2 * jnp.abs(self.path)) * weight
         turning = jnp.abs(D_rp) > 1e-9 * (1 + most)
         share = jnp.where(turning, at_90 / numerics.or_one(jnp.abs(D_rp), turning), 0.0)
-        inside = share < 1 - 1e-9
-        angle = jnp.where(inside, jnp.arccos(jnp.where(inside, share, 0.0)), 0.0)
+        inside = jnp.abs(share) < 1 - 1e-9
+        at_limit = jnp.where(share < 0, math.pi, 0.0)
+        angle = jnp.where(inside, jnp.arccos(jnp.where(inside, share, 0.0)), at_limit)
         return D_rp, jnp.where(turning, (2 / math.pi) * angle, 1.0)
 
 
