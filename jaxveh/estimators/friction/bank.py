@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction.along import AlongEvidence
@@ -19,10 +20,13 @@ from jaxveh.estimators.sequential import implicit_step
 from jaxveh.estimators.two_axles import LATERAL
 from jaxveh.vehicles import GRAVITY
 
-STATES = 8
-"""Number of states: v_y (m/s), yaw rate (rad/s), relative stiffness errors in front and at the rear, the offset of a_y (m/s^2),
-the error of the steer that comes and goes (rad), the relative increase of the measured a_y because the body leans, and the offset
-of the steer that stays (rad)."""
+State = record_type(
+    "BankState",
+    ("v_y", "yaw_rate", "soft_front", "soft_rear", "a_y_offset", "steer_error", "leaning", "steer_offset"),
+)
+"""Lateral velocity (m/s), yaw rate (rad/s), relative stiffness errors of both axles, the offset of a_y (m/s^2), the error of the
+steer that comes and goes (rad), the relative increase of the measured a_y because the body leans, and the offset of the steer
+that stays (rad)."""
 
 STEER_TIME = 3.0
 """s: time constant of an error of the measured steer, most of which is the play of the steering."""
@@ -144,15 +148,15 @@ class FrictionBank(AbstractMethod):
         return self.prior / jnp.sum(self.prior)
 
     def _start(self):
-        zero = jnp.zeros_like(self.frictions)
-        spread = jnp.stack([
-            0.5, 0.1, self.stiffness_spread, self.stiffness_spread, 0.15, self.steer_noise, GRAVITY * self.car.roll_gradient,
-            self.offset_spread,
-        ])  # fmt: skip
-        lean = GRAVITY * self.car.roll_gradient + zero
-        return jnp.zeros((len(zero), STATES), zero.dtype).at[:, 6].set(lean), jnp.repeat(
-            jnp.diag(spread**2)[None], len(zero), axis=0
-        )
+        """The means (K, 8) and covariances (K, 8, 8) before the first row."""
+        leaning, soft = GRAVITY * self.car.roll_gradient, self.stiffness_spread
+        spread = State(
+            v_y=0.5, yaw_rate=0.1, soft_front=soft, soft_rear=soft, a_y_offset=0.15, steer_error=self.steer_noise,
+            leaning=leaning, steer_offset=self.offset_spread,
+        )  # fmt: skip
+        mean = State(*[jnp.zeros_like(leaning)] * len(spread))._replace(leaning=leaning)
+        every = lambda one: jnp.repeat(one[None], len(self.frictions), axis=0)
+        return every(jnp.stack(mean)), every(jnp.diag(jnp.stack(spread) ** 2))
 
     def _mix(self, bank: Bank, dt) -> Bank:
         """The mixing step, in which friction walks and jumps: each filter starts from those whose friction may have changed to
@@ -177,14 +181,13 @@ class FrictionBank(AbstractMethod):
 
     def _forces(self, x, friction, told: Told):
         """Lateral forces of both axles (N) in the body's axes; longitudinal forces reduce the available friction."""
-        v_y, yaw_rate, soft_front, soft_rear, _, error, _, offset = x
-        car = self.car
-        slips = car.slip_angles(told.steer - error - offset, told.v_x, v_y, yaw_rate)
+        x, car = State(*x), self.car
+        slips = car.slip_angles(told.steer - x.steer_error - x.steer_offset, told.v_x, x.v_y, x.yaw_rate)
         loads = car.load_ratios(told.a_x)
         share = jnp.where(told.a_x < 0.0, car.front_brake, car.front_drive)
         forces = []
         for curve, slip, load, soft, part in zip(
-            (car.front, car.rear), slips, loads, (soft_front, soft_rear), (share, 1.0 - share), strict=True
+            (car.front, car.rear), slips, loads, (x.soft_front, x.soft_rear), (share, 1.0 - share), strict=True
         ):
             limit = jnp.maximum(friction, LEAST_FRICTION) * curve.peak * load
             left = numerics.sqrt(jnp.maximum(1.0 - jnp.square(car.mass * told.a_x * part / limit), 0.04))
@@ -194,28 +197,31 @@ class FrictionBank(AbstractMethod):
     def _rates(self, x, friction, told: Told):
         front, rear = self._forces(x, friction, told)
         car = self.car
-        v_y = (front + rear) / car.mass - told.v_x * x[1]
+        v_y = (front + rear) / car.mass - told.v_x * State(*x).yaw_rate
         turn = (car.front_axle_to_cg * front - car.rear_axle_to_cg * rear) / car.yaw_inertia
         return jnp.stack([v_y, turn])
 
     def _felt(self, x, friction, told: Told):
         """The lateral acceleration that the leaning accelerometer measures."""
         front, rear = self._forces(x, friction, told)
-        return (front + rear) / self.car.mass * (1.0 + x[6]) + x[4]
+        x = State(*x)
+        return (front + rear) / self.car.mass * (1.0 + x.leaning) + x.a_y_offset
 
     def _move(self, bank: Bank, told: Told, dt) -> Bank:
         """A linearly implicit trapezoidal step: stable at any speed."""
         soft = self.stiffness_spread * jnp.sqrt(2.0 / self.stiffness_time)
-        walks = jnp.stack([
-            self.v_y_noise, self.yaw_noise, soft, soft, 0.005, self.steer_noise * jnp.sqrt(2.0 / STEER_TIME), 0.001, 1e-5,
-        ])  # fmt: skip
-        noise = jnp.diag(jnp.square(walks) * dt)
-        same = jnp.ones_like(dt)
+        walks = State(
+            v_y=self.v_y_noise, yaw_rate=self.yaw_noise, soft_front=soft, soft_rear=soft, a_y_offset=0.005,
+            steer_error=self.steer_noise * jnp.sqrt(2.0 / STEER_TIME), leaning=0.001, steer_offset=1e-5,
+        )  # fmt: skip
+        noise = jnp.diag(jnp.square(jnp.stack(walks)) * dt)
         dies = jnp.exp(-dt / self.stiffness_time)
-        fades = jnp.stack([same, same, dies, dies, same, jnp.exp(-dt / STEER_TIME), same, same])
+        stays = State(*[jnp.ones_like(dt)] * len(walks))
+        fades = jnp.stack(stays._replace(soft_front=dies, soft_rear=dies, steer_error=jnp.exp(-dt / STEER_TIME)))
 
         def one(x, P, friction):
             change, slopes = implicit_step(lambda x: self._rates(x, friction, told), x, dt)
+            # Only v_y and yaw rate, the first two, change by the forces.
             step = jnp.diag(fades).at[:2].add(slopes)
             return (fades * x).at[:2].add(change), step @ P @ step.T + noise
 
@@ -231,9 +237,8 @@ class FrictionBank(AbstractMethod):
 
         def one(x, P, friction):
             said = []
-            for value, noise, seen in zip(
-                measured, noises, (lambda x: x[1], lambda x: self._felt(x, friction, told)), strict=True
-            ):
+            observations = (lambda x: State(*x).yaw_rate, lambda x: self._felt(x, friction, told))
+            for value, noise, seen in zip(measured, noises, observations, strict=True):
                 x, P, error, variance = scalar_update(x, P, value, seen, noise)
                 said.append((error, variance))
             return x, P, said

@@ -268,12 +268,12 @@ class SlipAware(AbstractMethod):
     def _use_wheels(self, memory: Memory, belief: Belief, t, step, wheels):
         there = ~jnp.isnan(wheels)
         smooth, steady = self._smooth_wheels(memory, t, wheels, there)
-        said = self._wheels(memory, belief.mean)
+        said, rolled = self._wheels(memory, belief.mean), SpeedState(*belief.mean).rolled
         suspicion = memory.suspicion * jnp.exp(-step / self.spreads.suspicion_time)
         most = jnp.sort(suspicion)[1]
         limit = jnp.maximum(suspicion, most)
         # A wheel at its limit slips in the direction of its force.
-        at_limit = self.spreads.limit_slip * limit * belief.mean[0]
+        at_limit = self.spreads.limit_slip * limit * rolled
         at_limit = at_limit * said.share / (jnp.abs(said.share) + 0.02)
 
         def expect(mean):
@@ -283,7 +283,7 @@ class SlipAware(AbstractMethod):
         white, slow = self._wheel_variances(memory, belief, said)
         slow = slow + jnp.square(at_limit)
         # Where one wheel locks or spins, the forces of the others are unknown.
-        slow = slow + jnp.square(self.spreads.other_slip * jnp.max(suspicion) * belief.mean[0])
+        slow = slow + jnp.square(self.spreads.other_slip * jnp.max(suspicion) * rolled)
         variances = jnp.concatenate([white + slow, numerics.as_wide_as(white, slow)])
         both = innovations(belief, expect, jnp.tile(wheels, 2), variances)
         found, rolling = (Innovation(*[part[rows] for part in both]) for rows in (slice(0, 4), slice(4, 8)))
@@ -296,7 +296,7 @@ class SlipAware(AbstractMethod):
         belief = update_by_each(belief, found, jnp.where(there, trust * lasts, 0.0))
         rolling = rolling._replace(residual=rolling.residual - rolling.slope @ (belief.mean - before))
         # A one-sided bound turns noise into a bias: only where most wheels are at their limit.
-        sure = most * smooth_step(jnp.abs(belief.mean[1]) - self.bound_force)
+        sure = most * smooth_step(jnp.abs(SpeedState(*belief.mean).force) - self.bound_force)
         belief = bound_by_two(belief, rolling, there, white, sure)
         locked = jnp.all(jnp.where(there, wheels == 0.0, memory.smooth == 0.0))
         strange = jnp.any(there & (steady < 0.5)) | locked
@@ -323,11 +323,11 @@ class SlipAware(AbstractMethod):
 
     def _white(self, belief: Belief):
         """The variance of a wheel's white noise that is assumed, (m/s)^2."""
-        return jnp.square(self.spreads.wheel) + jnp.square(self.spreads.wheel_share * belief.mean[0])
+        return jnp.square(self.spreads.wheel) + jnp.square(self.spreads.wheel_share * SpeedState(*belief.mean).rolled)
 
     def _wheel_variances(self, memory: Memory, belief: Belief, said: Said):
-        s, v_x = self.spreads, jnp.abs(belief.mean[0])
-        yaw_rate = self._lateral(memory, SpeedState(*belief.mean))[0]
+        s, x = self.spreads, SpeedState(*belief.mean)
+        v_x, (yaw_rate, _, _) = jnp.abs(x.rolled), self._lateral(memory, x)
         near_limit = s.peak_slip * jnp.square(jnp.square(said.share))
         white = memory.misfit.times[2] * self._white(belief)
         parts = [s.turn * yaw_rate, s.slip_share * said.slip * v_x, near_limit * v_x]

@@ -175,7 +175,7 @@ def bound_by_two(belief: Belief, rolling: Innovation, there: Any, white: Any, su
 
     A single wheel may be driven in a car that brakes, by the engine or a lifted wheel's differential.
     """
-    over = jnp.where(there, jnp.where(belief.mean[1] < 0.0, 1.0, -1.0) * rolling.residual, -jnp.inf)
+    over = jnp.where(there, jnp.where(SpeedState(*belief.mean).force < 0.0, 1.0, -1.0) * rolling.residual, -jnp.inf)
     second = jnp.argsort(over)[-2]
     slope = rolling.slope[second]
     one = Innovation(rolling.residual[second], slope @ belief.covariance @ slope + white, slope)

@@ -16,8 +16,16 @@ from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, AbstractWheelMethod, Wh
 from jaxveh.vehicles import GRAVITY
 
 
+class WeightedState(NamedTuple):
+    """The speed (m/s), the accelerometer's offset and gravity along the road (m/s^2)."""
+
+    v_x: Any
+    offset: Any
+    slope: Any
+
+
 class Weighed(NamedTuple):
-    """The belief of [v_x (m/s), offset, slope (m/s^2)], and the last measured acceleration, `felt`."""
+    """The belief about a `WeightedState`, and the last measured acceleration, `felt`."""
 
     belief: Belief
     felt: Felt
@@ -56,8 +64,9 @@ class Weighted(AbstractWheelMethod, AbstractOffsetAndSlope):
         del values
         speed = jnp.where(wheels.spoke, 0.5 + 0.03 * jnp.abs(wheels.mean), 30.0)
         zero = jnp.zeros_like(wheels.t)
-        std = jnp.stack([speed, zero + self.offset, zero + self.slope])
-        return Weighed(Belief(jnp.stack([wheels.mean, zero, zero]), jnp.diag(jnp.square(std))), never_felt(wheels.t))
+        mean = WeightedState(wheels.mean, offset=zero, slope=zero)
+        std = jnp.stack(WeightedState(speed, offset=zero + self.offset, slope=zero + self.slope))
+        return Weighed(Belief(jnp.stack(mean), jnp.diag(jnp.square(std))), never_felt(wheels.t))
 
     def next(self, memory, t, values):
         memory, said = super().next(memory, t, values)
@@ -73,31 +82,33 @@ class Weighted(AbstractWheelMethod, AbstractOffsetAndSlope):
         falls = jnp.exp(-step / self.slope_time)
 
         def move(mean):
-            rate = jnp.where(speaks, felt.value - mean[1] - mean[2], 0.0)
-            return jnp.stack([mean[0] + step * rate, mean[1], falls * mean[2]])
+            x = WeightedState(*mean)
+            rate = jnp.where(speaks, felt.value - x.offset - x.slope, 0.0)
+            return jnp.stack(x._replace(v_x=x.v_x + step * rate, slope=falls * x.slope))
 
-        walk = jnp.where(speaks, self.a_x, self.unfelt_walk)
-        noise = step * jnp.diag(jnp.square(jnp.stack([walk, self.offset_walk, self.slope_walk])))
+        walks = WeightedState(jnp.where(speaks, self.a_x, self.unfelt_walk), self.offset_walk, self.slope_walk)
+        noise = step * jnp.diag(jnp.square(jnp.stack(walks)))
         belief = predict(own.belief, move, noise)
         parts = [self.wheel, self.share * wheels.mean, self.by_spread * (wheels.fastest - wheels.slowest)]
         parts += [self.by_acceleration * jnp.where(speaks, felt.value, 0.0)]
         variance = sum(jnp.square(one) for one in parts)
         mean = jnp.where(wheels.new, wheels.mean, jnp.nan)
-        found = innovation(belief, lambda x: x[0], mean, variance)
+        found = innovation(belief, lambda x: WeightedState(*x).v_x, mean, variance)
         belief = update(belief, found, 1.0)
-        std = _std(belief, 0)
-        return Weighed(belief, felt), belief.mean[0], self.is_small(std, belief.mean[0])
+        v_x = WeightedState(*belief.mean).v_x
+        return Weighed(belief, felt), v_x, self.is_small(_stds(belief).v_x, v_x)
 
     def _with_bands(self, own: Weighed, said: Any):
-        belief = own.belief
-        mean = {"v_x": belief.mean[0], "grade": numerics.arctan(belief.mean[2] / GRAVITY), "a_x_offset": belief.mean[1]}
-        std = {
-            "v_x": numerics.hypot(_std(belief, 0), self.radius * mean["v_x"]),
-            "grade": _std(belief, 2) / GRAVITY,
-            "a_x_offset": _std(belief, 1),
+        x, std = WeightedState(*own.belief.mean), _stds(own.belief)
+        means = {"v_x": x.v_x, "grade": numerics.arctan(x.slope / GRAVITY), "a_x_offset": x.offset}
+        stds = {
+            "v_x": numerics.hypot(std.v_x, self.radius * x.v_x),
+            "grade": std.slope / GRAVITY,
+            "a_x_offset": std.offset,
         }
-        return answer(mean, std, said.known.v_x)
+        return answer(means, stds, said.known.v_x)
 
 
-def _std(belief: Belief, i: int) -> jax.Array:
-    return numerics.sqrt(jnp.maximum(belief.covariance[i, i], 0.0))
+def _stds(belief: Belief) -> WeightedState:
+    """The standard deviations of the states."""
+    return WeightedState(*numerics.sqrt(jnp.maximum(jnp.diagonal(belief.covariance), 0.0)))
