@@ -151,7 +151,7 @@ class Live(eqx.Module):
             raise InputError(f"row: no value for the input(s) {', '.join(missing)}.")
         names = self.cleaning.channels or (*self.model.inputs, *self.model.channels)
         numbers = [channels.get(name, np.nan) for name in names]
-        t, *values = kit.scalar_row(t, numbers, self.model.prior.mean[0].dtype, tuple(names))
+        t, *values = kit.scalar_row(t, numbers, self.model.dtype, tuple(names))
         return t, dict(zip(names, values, strict=True))
 
 

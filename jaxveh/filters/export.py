@@ -40,7 +40,7 @@ def export_filter(folder: str | Path, filter: AbstractFilter, model: StateSpace,
         raise InputError(f"folder = {folder}: exists already; nothing is overwritten.")
     filter.check(model)
     kit.require("flatbuffers", "the file of an exported program", "export")
-    dtype = model.prior.mean[0].dtype
+    dtype = model.dtype
     like = (
         jax.ShapeDtypeStruct((), dtype),
         jax.ShapeDtypeStruct((len(model.inputs),), dtype),

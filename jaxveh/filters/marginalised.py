@@ -199,7 +199,7 @@ class Marginalised(AbstractParticleFilter):
 
     def _start(self, model, row, key):
         draw, key = jax.random.split(key)
-        dtype = model.prior.mean[0].dtype
+        dtype = model.dtype
         n, others = self.particles, _others(self, model)
         order = np.array([model.states.index(name) for name in (*others, *self.linear)])
         joint = model.prior.covariance()[order][:, order]
@@ -302,7 +302,7 @@ def _check_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
 @eqx.filter_jit
 def _nonlinear_in(linear: tuple[str, ...], model: StateSpace) -> list[Any]:
     """Whether each state (n,) and each channel (m,) is nonlinear in the states `linear`."""
-    dtype = model.prior.mean[0].dtype
+    dtype = model.dtype
     t0, t1 = jnp.zeros((), dtype), jnp.asarray(0.01, dtype)
     u = record("Inputs", {name: jnp.asarray(1.0, dtype) for name in model.inputs})
     spread = dict(zip(model.states, 10.0 * jnp.sqrt(jnp.diagonal(model.prior.covariance())), strict=True))

@@ -102,7 +102,7 @@ class Adaptive(AbstractObserver):
 
     def start(self, model):
         own, adapted = self._places(model)
-        return jnp.zeros((len(own), len(adapted)), model.prior.mean[0].dtype)
+        return jnp.zeros((len(own), len(adapted)), model.dtype)
 
     def _places(self, model: StateSpace) -> tuple[np.ndarray, np.ndarray]:
         """Indices of the states (n,) and of the parameters (p,) in the state."""

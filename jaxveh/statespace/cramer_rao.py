@@ -141,7 +141,7 @@ def _with_recursion(model: StateSpace, noisy: tuple[str, ...], terms: _Terms) ->
 
     **Raises** `InputError` if a state without a recursion affects the others, or if no state has one.
     """
-    rounding = 1e3 * np.finfo(model.prior.mean[0].dtype).eps
+    rounding = 1e3 * np.finfo(model.dtype).eps
     bent = (terms.spread > rounding * (1 + np.abs(terms.F))).any(axis=(0, 2))
     without = np.array([bent[i] and name not in noisy for i, name in enumerate(model.states)])
     kept = np.flatnonzero(~without)

@@ -113,7 +113,7 @@ def with_disturbances(
             check_single(**{f"with_disturbances: {what} of {name}": value})
             check_positive(f"{what} of {name}", value, "the state's unit per second")
     disturbances = Disturbances(tuple(prior), tuple(felt.items()))
-    kind, dtype = type(model.prior.mean), model.prior.mean[0].dtype
+    kind, dtype = type(model.prior.mean), model.dtype
     scalar = lambda value: jnp.asarray(value, dtype)
     joint = record_type("State", (*model.states, *disturbances.names))
     law = combine(

@@ -27,9 +27,9 @@ from jaxveh.statespace.driver import (
     scan_by,
     scan_in_form,
 )
+from jaxveh.statespace.given_rows import scalar_row
 from jaxveh.statespace.independent import whiten
 from jaxveh.statespace.measurements import by_channel, input_result, likelihood_result, presence, result_of_parts
-from jaxveh.statespace.model import scalar_row
 from jaxveh.statespace.noise import LOG_2PI
 from jaxveh.statespace.solvers import EXPLICIT, in_both_modes
 

@@ -14,25 +14,20 @@ from jaxveh._core.errors import (
     InputError,
     check_finite,
     check_kind,
-    check_numbers,
-    check_single,
     check_takes,
     float_array,
-    is_concrete,
     word_for,
 )
 from jaxveh._core.names import as_names, check_names, record
 from jaxveh._core.own_results import named_record, numbers_as_given
 from jaxveh._core.parameter import UNNAMED
-from jaxveh._core.recording import Recording, check_recording, gap_to_fill, time_for
+from jaxveh._core.recording import Recording, check_recording, time_for
 from jaxveh._core.traced import trace_once
 from jaxveh.statespace.dependent_noise import MeasurementNoise, StateDependent
+from jaxveh.statespace.given_rows import channel_values, scalar_row
 from jaxveh.statespace.noise import AbstractNoise, Gaussian
 from jaxveh.statespace.one_model import check_one_model
 from jaxveh.statespace.process import AbstractProcessNoise
-
-COARSEST = 0.05
-"""The coarsest resolution of a live loop's time, s: that of float32 after four days; at UNIX time stamps it is two minutes."""
 
 
 class Row(NamedTuple):
@@ -170,6 +165,11 @@ class StateSpace(eqx.Module):
         """The measured channels' names."""
         return self.measurement_noise.names
 
+    @property
+    def dtype(self) -> Any:
+        """The precision of the state's mean, in which a filter computes."""
+        return self.prior.mean[0].dtype
+
     def rows(self, recording: Recording) -> Row:
         """The recording as rows for this model: each leaf (T,); host-side checks, skipped for tracers.
 
@@ -179,9 +179,9 @@ class StateSpace(eqx.Module):
         check_recording("StateSpace.rows", recording)
         check_one_model(self.prior, self.process_noise, self.measurement_noise)
         check_names("recording lacks a channel the model needs", (*self.inputs, *self.channels), recording.names)
-        dtype = self.prior.mean[0].dtype
-        u = {name: _channel(recording, name, dtype, is_input=True) for name in self.inputs}
-        y = {name: _channel(recording, name, dtype, is_input=False) for name in self.channels}
+        dtype = self.dtype
+        u = {name: channel_values(recording, name, dtype, is_input=True) for name in self.inputs}
+        y = {name: channel_values(recording, name, dtype, is_input=False) for name in self.channels}
         time = jnp.asarray(time_for(recording, dtype), dtype)
         return Row(time, record("Inputs", u), record("Measurements", y))
 
@@ -189,12 +189,11 @@ class StateSpace(eqx.Module):
         """One row for a live loop from plain numbers; channels left out of `y` are missing."""
         check_names("inputs", u, self.inputs)
         check_names("measurements", y, self.channels)
-        dtype = self.prior.mean[0].dtype
         missing = [name for name in self.inputs if name not in u]
         if missing:
             raise InputError(f"row: no value for the input(s) {', '.join(missing)}.")
         numbers = [*(u[name] for name in self.inputs), *(y.get(name, np.nan) for name in self.channels)]
-        t, *others = scalar_row(t, numbers, dtype, (*self.inputs, *self.channels))
+        t, *others = scalar_row(t, numbers, self.dtype, (*self.inputs, *self.channels))
         inputs = record("Inputs", dict(zip(self.inputs, others, strict=False)))
         measured = record("Measurements", dict(zip(self.channels, others[len(self.inputs) :], strict=True)))
         return Row(t, inputs, measured)
@@ -241,71 +240,6 @@ def _check_function(name: str, function: Any, *arguments: str) -> None:
     check_takes(f"StateSpace: {name}", function, *arguments)
     if isinstance(function, PerPoint):
         check_takes(f"StateSpace: {name}.function", function.function, *arguments)
-
-
-def scalar_row(t, numbers: list, dtype, names: tuple[str, ...]) -> tuple:
-    """A row's time (s) and numbers, each with its name, as scalars of a dtype, for a live loop.
-
-    **Raises** `InputError` for a time that is not finite or that the dtype resolves too coarsely, and what is no number.
-    """
-    _check_stamp(t, dtype)
-    for name, number in zip(names, numbers, strict=True):
-        if getattr(number, "ndim", 0):
-            check_single(**{f"row: {name}": number})
-    try:
-        return _scalars([t, *numbers], dtype)
-    except (TypeError, ValueError):
-        for name, number in zip(names, numbers, strict=True):
-            check_numbers(f"row: {name}", np.nan if number is None else number)
-        raise
-
-
-def _check_stamp(t, dtype) -> None:
-    """Raise `InputError` for a time so large that no digits are left for a step, and for one that is no finite number."""
-    if not is_concrete(t):
-        return
-    if type(t) is not float:
-        check_single(**{"row: t": t})
-    if not np.isfinite(t):
-        raise InputError(f"row: t = {t}: must be finite (s), in every row.")
-    if np.spacing(np.abs(np.asarray(t, dtype))) > COARSEST:
-        raise InputError(
-            f"row: t = {float(t)} s has a resolution of {float(np.spacing(np.asarray(t, dtype))):.3g} s in "
-            f"{np.dtype(dtype).name}: count time from the first row, or use float64."
-        )
-
-
-def _scalars(numbers: list, dtype) -> tuple:
-    """Numbers as arrays, all at once: passing each one separately would take longer than computing a filter's step."""
-    if is_concrete(*numbers) and not any(np.ndim(number) for number in numbers):
-        return _split(np.array(numbers, dtype))
-    return tuple(jnp.asarray(number, dtype) for number in numbers)
-
-
-@jax.jit
-def _split(vector):
-    return tuple(vector)
-
-
-def _channel(recording: Recording, name: str, dtype, is_input: bool):
-    values = recording[name]
-    if is_concrete(values):
-        array = np.asarray(values)
-        if is_input and np.isnan(array).any():
-            k = int(np.argmax(np.isnan(array)))
-            if np.isnan(array).all():
-                raise InputError(f"input channel {name} has no value in any row.")
-            needed = gap_to_fill(recording, name)
-            raise InputError(
-                f"input channel {name} is NaN in {int(np.isnan(array).sum())} rows, first at t = {recording.time[k]} s: "
-                f'an input must be known in every row. Fill it with: recording.fill("{name}", "linear", max_gap={needed:g}).'
-            )
-        if np.isinf(array).any():
-            k = int(np.argmax(np.isinf(array)))
-            raise InputError(
-                f"channel {name} is {array[k]} at t = {recording.time[k]} s: must be finite, or NaN if missing."
-            )
-    return values.astype(dtype)
 
 
 class LinearInput(eqx.Module):

@@ -24,7 +24,7 @@ def check_rows(who: str, model: StateSpace, rows: Any, axes: int) -> None:
         raise InputError(f"{who}: {name} = {word_for(rows)}: must be a Row(t, u, y). {MAKES}")
     _check_fields(f"{who}: {name}.u", rows.u, model.inputs, "the model's inputs")
     _check_fields(f"{who}: {name}.y", rows.y, model.channels, "the model's channels, NaN where one is missing")
-    own = model.prior.mean[0].dtype
+    own = model.dtype
     values = (rows.t, *(rows.u or ()), *rows.y)
     # A live loop is held up by every name that is put together for nothing.
     shape = getattr(rows.t, "shape", ())

@@ -95,7 +95,7 @@ class AbstractPlaced(AbstractObserver):
         del model
 
     def start(self, model):
-        eye = jnp.eye(2, dtype=model.prior.mean[0].dtype)
+        eye = jnp.eye(2, dtype=model.dtype)
         return StepMemory(eye, jnp.zeros((), bool))
 
     def predict(self, model, belief, row):

@@ -169,7 +169,7 @@ def check_weights(filter: AbstractRuleFilter, model: StateSpace) -> None:
             f"{type(filter).__name__}: a weight is negative for {len(model.states)} states, which {form.__name__} cannot take. "
             "Use positive weights (alpha = 1, kappa >= 0), or Covariance()."
         )
-    rule, dtype = filter.rule(len(model.states)), model.prior.mean[0].dtype
+    rule, dtype = filter.rule(len(model.states)), model.dtype
     lost = rule.amplification * float(jnp.finfo(dtype).eps)
     if lost > MOST_LOST:
         # Python shows a warning once if its words do not change with the numbers.
@@ -213,7 +213,7 @@ def kind_of_law(model: StateSpace) -> AbstractNoise:
     """The law of the measurement noise; where it depends on the state, the law at the prior's mean, without numbers."""
     if not isinstance(model.measurement_noise, StateDependent):
         return model.measurement_noise
-    number = jax.ShapeDtypeStruct((), model.prior.mean[0].dtype)
+    number = jax.ShapeDtypeStruct((), model.dtype)
     u = record("Inputs", dict.fromkeys(model.inputs, number))
     laws = []
     eqx.filter_eval_shape(lambda t, u: laws.append(model.measurement_law(t, model.prior.mean, u)), number, u)

@@ -58,7 +58,7 @@ def _noise_varies(model: StateSpace):
 
 
 def _functions(model: StateSpace, value: float):
-    dtype = model.prior.mean[0].dtype
+    dtype = model.dtype
     t0, t1 = jnp.zeros((), dtype), jnp.asarray(0.01, dtype)
     u = record("Inputs", {name: jnp.asarray(value, dtype) for name in model.inputs})
     kind = type(model.prior.mean)

@@ -48,7 +48,7 @@ class ShrinkingProcess(AbstractRemembering):
         self.inner.check(model)
 
     def start(self, model):
-        return jnp.asarray([std**2 for _, std in self.extra], model.prior.mean[0].dtype)
+        return jnp.asarray([std**2 for _, std in self.extra], model.dtype)
 
     def believed_model(self, model, memory):
         return with_extra(model, {name: memory[i] for i, (name, _) in enumerate(self.extra)})
@@ -90,7 +90,7 @@ class MatchedProcess(AbstractRemembering):
         self.inner.check(model)
 
     def start(self, model):
-        nothing = jnp.zeros(len(self.most), model.prior.mean[0].dtype)
+        nothing = jnp.zeros(len(self.most), model.dtype)
         # The excess of the squared corrections over the model's own variances, and these variances over the last step.
         return nothing, nothing
 

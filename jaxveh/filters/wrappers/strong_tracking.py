@@ -38,7 +38,7 @@ class StrongTracking(AbstractRemembering):
         check("StrongTracking.ceiling", self.ceiling, lambda v: v >= 1, "at least 1")
 
     def start(self, model):
-        dtype = model.prior.mean[0].dtype
+        dtype = model.dtype
         # V divided by the noise variance; negative before a channel's first row.
         return jnp.full(len(model.channels), -1.0, dtype)
 
