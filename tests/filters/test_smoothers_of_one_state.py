@@ -86,6 +86,34 @@ def test_the_parallel_smoother_is_the_smoother_and_its_filter_the_filter():
         filters.smooth_parallel(filters.Kalman(filters.SquareRoot()), MODEL, RECORDING)
 
 
+def gauss_newton(passes):
+    """The path (5,) after so many linearisations of `level + 0.3 level^2`, the first at the prior, by least squares."""
+    there, step = np.isfinite(FLOW), np.diff(TIME)
+    path = np.full(5, 0.7)
+    for _ in range(passes):
+        slope, seen = 1.0 + 0.6 * path, path + 0.3 * path**2
+        rows, right = [np.eye(5)[0] / P0**0.5], [0.7 / P0**0.5]
+        for k in range(4):
+            rows.append((np.eye(5)[k + 1] - (1.0 - 0.2 * step[k]) * np.eye(5)[k]) / (Q * step[k]) ** 0.5)
+            right.append(0.0)
+        for k in np.flatnonzero(there):
+            rows.append(slope[k] * np.eye(5)[k] / R**0.5)
+            right.append((FLOW[k] - seen[k] + slope[k] * path[k]) / R**0.5)
+        path = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
+    return path
+
+
+def test_a_parallel_smoother_linearises_as_often_as_it_is_told():
+    see = lambda system, t, x, u: see_level(system, t, Level(x.level + 0.3 * x.level**2), u)
+    model = ss.StateSpace(
+        transition=decay, observation=see, process_noise=MODEL.process_noise, measurement_noise=MODEL.measurement_noise,
+        prior=MODEL.prior,
+    )  # fmt: skip
+    for passes in (1, 3):
+        found = filters.smooth_parallel(filters.Iterated(filters.Extended(), passes), model, RECORDING)
+        np.testing.assert_allclose(found.mean.level, gauss_newton(passes), rtol=1e-9)
+
+
 @pytest.mark.parametrize("form", [filters.Covariance, filters.SquareRoot])
 def test_a_fixed_lag_is_the_smoother_of_the_rows_so_far(form):
     found = filters.smooth(filters.Kalman(form()), MODEL, RECORDING, lag=2)

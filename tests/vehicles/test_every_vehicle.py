@@ -28,7 +28,8 @@ from jaxveh.simulation import simulate
 pytestmark = pytest.mark.product
 
 SPEED = 15.0
-ROUGH = Ground(0.9, 0.8, 1.1, 0.7, 0.02, 0.03)
+ROUGH = Ground(0.9, 0.8, 1.1, 0.7, 0.02, 0.03, 0.004, -0.003, 0.002, -0.005)
+"""No field is that of a level road: what is on record sees all of them."""
 
 
 def brush():

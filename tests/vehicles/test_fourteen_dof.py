@@ -86,6 +86,23 @@ def test_place_and_heading_change_nothing():
     assert float(there.x) == 130.0
 
 
+def test_a_road_that_lies_higher_lifts_the_car_and_under_one_wheel_loads_that_wheel():
+    car = make(AllMoments())
+    u, x, names = inputs(0.05), moving(car, z=car.cg_height - 0.03, roll=0.01, pitch=-0.005), wheel_names("height")
+    rate, shown = evaluate(car, x, u)
+    assert (wheels(shown, "load") > 500.0).all()
+    higher = Ground(**dict.fromkeys(names, jnp.asarray(0.03)))
+    lifted, above = evaluate(car, x._replace(z=x.z + 0.03), u, higher)
+    np.testing.assert_allclose(np.asarray(lifted), np.asarray(rate), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(wheels(above, "load"), wheels(shown, "load"), rtol=1e-9)
+    for k, name in enumerate(names):
+        _, found = evaluate(car, x, u, Ground(**{name: jnp.asarray(1e-3)}))
+        more = wheels(found, "load") - wheels(shown, "load")
+        np.testing.assert_allclose(
+            more, np.where(np.arange(4) == k, 1e-3 * float(car.tyre_stiffness), 0.0), rtol=0.02, atol=1e-6
+        )
+
+
 def test_a_car_in_the_air_falls():
     """No load, no pull, no tyre force; the springs push body and wheels apart, and all together falls."""
     car = make(roll_centre_front=0.0, roll_centre_rear=0.0, pitch_slope_front=0.0, pitch_slope_rear=0.0)

@@ -57,6 +57,10 @@ def test_motion_is_that_recorded(name):
     check_recorded(__file__, name, found)
 
 
+def test_no_field_of_the_rough_ground_is_that_of_a_level_one():
+    assert all(rough != level for rough, level in zip(ROUGH, LEVEL, strict=True))
+
+
 OPTIONS = {
     "not mirrored": ("SevenDOF", lambda car: dataclasses.replace(car, front=shifted_mf(), mirrored=False)),
     "mirrored": ("SevenDOF", lambda car: dataclasses.replace(car, front=shifted_mf())),
