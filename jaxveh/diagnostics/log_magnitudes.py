@@ -82,7 +82,7 @@ def check_units(log: LogView) -> list[LogFinding]:
             if not values.size:
                 continue
             found = _size(name, float(np.quantile(np.abs(values), 0.995)), limit)
-            findings.append(_placeholder(name, values, limit, found) if found.severity != "ok" else found)
+            findings.append(_placeholder(values, limit, found) if found.severity != "ok" else found)
             findings += _negative(name, values) if name in UNSIGNED else []
     return findings
 
@@ -122,7 +122,7 @@ def _size(name: str, size: float, limit: Limit) -> LogFinding:
     return LogFinding("ok", name, f"reaches {size:.4g} ({limit.unit}).", values)
 
 
-def _placeholder(name: str, values: np.ndarray, limit: Limit, found: LogFinding) -> LogFinding:
+def _placeholder(values: np.ndarray, limit: Limit, found: LogFinding) -> LogFinding:
     """Return the finding that one value beyond the limit stands for missing ones, if it is the only one; otherwise `found`."""
     beyond = np.abs(values) > limit.size
     others = np.abs(values[~beyond])

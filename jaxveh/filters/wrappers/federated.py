@@ -143,7 +143,7 @@ class Federated(AbstractWrapper):
         return jax.vmap(lambda share: master.inflate(1.0 if self.common else 1.0 / share))(shares)
 
     def _update_locals(self, model, belief: FederatedBelief, predicted: GaussianBelief, ahead: GaussianBelief, row):
-        rows = _together([_only(model, row, group).y for group in self.groups])
+        rows = _together([_only(row, group).y for group in self.groups])
         own = lambda local, y: self.inner.update(model, local, row._replace(y=y))
         found, _ = jax.vmap(own)(ahead, rows)
         # The prediction of a local filter is wide, so that its NIS is seldom large: sensors are judged by the fused prediction.
@@ -201,7 +201,7 @@ def _together(trees: Sequence[Any]) -> Any:
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)
 
 
-def _only(model: StateSpace, row: Row, group: tuple[str, ...]) -> Row:
+def _only(row: Row, group: tuple[str, ...]) -> Row:
     """The row with the channels of a group; the others are missing."""
     y = row.y._asdict()
     return row._replace(

@@ -56,7 +56,7 @@ class Paused(AbstractWrapper):
 
     def _init(self, model, row, key):
         prior = self.inner.prior(model, row)
-        after, info = self.inner.update(model, prior, self._silent(model, row))
+        after, info = self.inner.update(model, prior, self._silent(row))
         return either(self._waits(row.u), _after(prior, row), after), info
 
     def _step(self, model, belief, row):
@@ -64,13 +64,13 @@ class Paused(AbstractWrapper):
         ahead = self.inner.predict_between(model, belief, row.t, row.u)
         here = either(waits, belief, self._widen(model, belief))
         start = either(waited, _at(here, t=row.t), ahead)
-        after, info = self.inner.update(model, start, self._silent(model, row))
+        after, info = self.inner.update(model, start, self._silent(row))
         return either(waits, _after(start, row), after), info
 
     def _waits(self, u):
         return getattr(u, self.channel) > 0.5
 
-    def _silent(self, model, row):
+    def _silent(self, row):
         """The row; while paused, all its measurements are missing."""
         return row._replace(y=jax.tree.map(lambda value: jnp.where(self._waits(row.u), jnp.nan, value), row.y))
 
