@@ -16,8 +16,8 @@ from jaxveh.estimators.friction import brush_curve
 from jaxveh.estimators.friction.curve_follower import CurveBelief, CurveFollower
 from jaxveh.estimators.friction.laws import PlanarCar
 from jaxveh.estimators.friction.motion import Told, next_told, start_told
-from jaxveh.estimators.friction.scalar import Follower, LogFriction
-from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.friction.scalar import Follower
+from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.two_axles import LATERAL
 from jaxveh.vehicles import GRAVITY
 
@@ -122,7 +122,7 @@ class LateralCurve(AbstractMethod):
 
     def first(self, t, values):
         now, state = self.axles.start(t, values), self.follower.start()
-        return (now, state), self._answer(now, state)
+        return (now, state), self.follower.says(state, now.told.moves)
 
     def next(self, memory, t, values):
         last, state = memory
@@ -134,11 +134,7 @@ class LateralCurve(AbstractMethod):
         tells = self.axles.bend(forces, difference, state.log_friction, state.stiffer) > self.knee
         here = now.told.moves & ~jnp.isnan(values["a_y"])
         state = self.follower.next(state, dt, residual, noise, here, tells)
-        return (now, state), self._answer(now, state)
-
-    def _answer(self, now: AxlesTold, state: CurveBelief):
-        mean, std, known = self.follower.says(state, now.told.moves)
-        return answer({"friction": mean}, {"friction": std}, known)
+        return (now, state), self.follower.says(state, now.told.moves)
 
 
 class AligningTorque(AbstractMethod):
@@ -166,7 +162,7 @@ class AligningTorque(AbstractMethod):
     def first(self, t, values):
         now, state = self.axles.start(t, values), self.follower.start()
         torque = jnp.where(jnp.isnan(values["steering_torque"]), 0.0, values["steering_torque"])
-        return (now, torque, state), self._answer(now, state)
+        return (now, torque, state), self.follower.says(state, now.told.moves)
 
     def next(self, memory, t, values):
         last, torque, state = memory
@@ -185,11 +181,7 @@ class AligningTorque(AbstractMethod):
 
         noise = self.steering_ratio * self.torque_noise + self.trail_noise * jnp.abs(force)
         state = self.follower.next(state, dt, residual, noise, here)
-        return (now, torque, state), self._answer(now, state)
-
-    def _answer(self, now: AxlesTold, state: LogFriction):
-        mean, std, known = self.follower.says(state, now.told.moves)
-        return answer({"friction": mean}, {"friction": std}, known)
+        return (now, torque, state), self.follower.says(state, now.told.moves)
 
 
 class Window(NamedTuple):
@@ -247,7 +239,7 @@ class HybridObserver(AbstractMethod):
             mean=jnp.where(better, state.mean.at[0].set(mean), state.mean),
             covariance=jnp.where(better, told, state.covariance),
         )
-        return ((now, state), window), self.lateral._answer(now, state)
+        return ((now, state), window), self.lateral.follower.says(state, now.told.moves)
 
     def _least_squares(self, window: Window, state: CurveBelief):
         """ln mu, its information, and its derivatives by the logarithms of front and rear stiffness (2,): three damped

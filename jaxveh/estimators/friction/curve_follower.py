@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.friction.scalar import HIGHEST_FRICTION, LOWEST_FRICTION, AbstractFollower
+from jaxveh.estimators.method import Answer, answer
 
 
 class CurveBelief(NamedTuple):
@@ -82,7 +83,8 @@ class CurveFollower(AbstractFollower):
     def _forgets_friction(self, P):
         return P.at[0, :].set(0.0).at[:, 0].set(0.0).at[0, 0].set(jnp.square(self.spread))
 
-    def says(self, state: CurveBelief, moves):
-        """Friction, its standard deviation and whether it is known."""
-        mu, variance = jnp.exp(state.mean[0]), state.covariance[0, 0]
-        return mu, mu * numerics.sqrt(jnp.maximum(variance, 0.0)), moves & (variance < jnp.square(self.known))
+    def says(self, state: CurveBelief, moves) -> Answer:
+        """The answer `friction` of a belief; `moves`: whether the car does, without which nothing is known."""
+        mu, variance = jnp.exp(state.log_friction), state.covariance[0, 0]
+        std, known = mu * numerics.sqrt(jnp.maximum(variance, 0.0)), moves & (variance < jnp.square(self.known))
+        return answer({"friction": mu}, {"friction": std}, known)

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
+from jaxveh.estimators.method import Answer, answer
 
 LOWEST_FRICTION, HIGHEST_FRICTION = 0.05, 1.5
 """Bounds of a friction."""
@@ -79,7 +80,7 @@ class Follower(AbstractFollower):
         mean = jnp.clip(mean + step, jnp.log(LOWEST_FRICTION), jnp.log(HIGHEST_FRICTION))
         return LogFriction(mean, after, jnp.where(jumped, 1.0, average))
 
-    def says(self, state: LogFriction, moves):
-        """Friction, its standard deviation and whether it is known."""
-        mu = jnp.exp(state.mean)
-        return mu, mu * jnp.sqrt(state.variance), moves & (state.variance < jnp.square(self.known))
+    def says(self, state: LogFriction, moves) -> Answer:
+        """The answer `friction` of a belief; `moves`: whether the car does, without which nothing is known."""
+        mu, known = jnp.exp(state.mean), moves & (state.variance < jnp.square(self.known))
+        return answer({"friction": mu}, {"friction": mu * jnp.sqrt(state.variance)}, known)

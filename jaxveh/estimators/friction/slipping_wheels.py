@@ -151,11 +151,19 @@ class SidesApart(AbstractWheelMethod):
     def say(self, memory):
         moves = memory.wheels.told.moves
         left, right = (self.follower.says(side, moves) for side in (memory.left, memory.right))
-        mean = {"friction": 0.5 * (left[0] + right[0]), "friction_left": left[0], "friction_right": right[0]}
-        std = {
-            "friction": 0.5 * numerics.hypot(left[1], right[1]),
-            "friction_left": left[1],
-            "friction_right": right[1],
+        mean = {
+            "friction": 0.5 * (left.mean.friction + right.mean.friction),
+            "friction_left": left.mean.friction,
+            "friction_right": right.mean.friction,
         }
-        known = {"friction": left[2] & right[2], "friction_left": left[2], "friction_right": right[2]}
+        std = {
+            "friction": 0.5 * numerics.hypot(left.std.friction, right.std.friction),
+            "friction_left": left.std.friction,
+            "friction_right": right.std.friction,
+        }
+        known = {
+            "friction": left.known.friction & right.known.friction,
+            "friction_left": left.known.friction,
+            "friction_right": right.known.friction,
+        }
         return answer(mean, std, known)
