@@ -12,14 +12,14 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_finite, check_flags, check_has, check_kind, path_of
+from jaxveh._core.errors import InputError, check_finite, check_has, check_kind, path_of
 from jaxveh._core.parameter import Parameter, put, resolve
 from jaxveh._core.parameters import Parameters
 from jaxveh._core.result import Result, code
 from jaxveh._core.version import VERSION
 from jaxveh.estimators.contract import Calibration, Span, Told
 from jaxveh.fitting import Fit
-from jaxveh.io import kit, write_text
+from jaxveh.io import kit
 
 KEYS = (
     "estimator",
@@ -58,7 +58,6 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike, *, over
 
     **Raises** `InputError` where the file exists and `overwrite` is False, or the calibration did not start from a car's file.
     """
-    check_flags(overwrite=overwrite)
     path = path_of(path)
     check_kind("calibration", calibration, Calibration, "The `calibrate` of an estimator makes one.")
     told, fit = calibration.told, calibration.fit
@@ -98,7 +97,7 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike, *, over
         f"{kit.toml_string(p.name)} = [{', '.join(_number(value) for value in rows[i, : i + 1])}]"
         for i, p in enumerate(fit.chosen)
     ]
-    write_text("\n".join(lines) + "\n", path, overwrite)
+    kit.write_toml(lines, path, overwrite)
 
 
 def read_calibration(path: str | os.PathLike, *, estimator: ModuleType | None = None) -> Calibration:

@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_flags, check_one_of, path_of
+from jaxveh._core.errors import InputError, check, check_one_of, path_of
 from jaxveh.io.car_table import CarTable
-from jaxveh.io.files import write_text
-from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text
+from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text, write_toml
 
 CAR_SCHEMA = """\
 # A car. SI units; axes x forward, y left, z up; steer positive to the left.
@@ -236,9 +235,7 @@ def write_car(car: CarSpecification, path: str | os.PathLike, *, note: str = "",
 
     The file is written completely or not at all. **Raises** `InputError` if it exists and `overwrite` is False.
     """
-    check_flags(overwrite=overwrite)
-    lines = [f"# {line}".rstrip() for line in note.splitlines()]
-    write_text("\n".join(lines + car_lines(car)) + "\n", path, overwrite)
+    write_toml(car_lines(car), path, overwrite, note)
 
 
 def car_lines(car: CarSpecification, table: str = "") -> list[str]:

@@ -12,7 +12,17 @@ from jaxveh.io.property_file import PROPERTY_UNITS, Entry, parse_property_file
 from jaxveh.io.result_files import RESULT_SUFFIXES, load_result, save_result
 from jaxveh.io.rig_table import RIG_CHANNELS
 from jaxveh.io.steering import check_front_steered
-from jaxveh.io.toml import FILES, check_file, check_keys, read_toml, shorten, toml_number, toml_string, toml_text
+from jaxveh.io.toml import (
+    FILES,
+    check_file,
+    check_keys,
+    read_toml,
+    shorten,
+    toml_number,
+    toml_string,
+    toml_text,
+    write_toml,
+)
 from jaxveh.io.units import is_unit, same_unit
 
 __all__ = [
@@ -50,4 +60,5 @@ __all__ = [
     "toml_number",
     "toml_string",
     "toml_text",
+    "write_toml",
 ]

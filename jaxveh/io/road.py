@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_flags, check_one_of, path_of
-from jaxveh.io.files import write_text
-from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text
+from jaxveh._core.errors import InputError, check, check_one_of, path_of
+from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text, write_toml
 
 ROAD_SCHEMA = """\
 # A road along the x axis. SI units; y left, z up.
@@ -99,14 +98,13 @@ def write_road(road: RoadSpecification, path: str | os.PathLike, *, note: str = 
 
     The file is written completely or not at all. **Raises** `InputError` if it exists and `overwrite` is False.
     """
-    check_flags(overwrite=overwrite)
-    lines = [f"# {line}".rstrip() for line in note.splitlines()]
+    lines = []
     for entry in fields(road):
         value = getattr(road, entry.name)
         if value is not None:
             shown = toml_string(value) if isinstance(value, str) else list(value) if isinstance(value, tuple) else value
             lines.append(f"{entry.name} = {shown}")
-    write_text("\n".join(lines) + "\n", path, overwrite)
+    write_toml(lines, path, overwrite, note)
 
 
 def _value(key: str, value: Any) -> Any:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from jaxveh._core.errors import InputError
-from jaxveh.io.files import check_readable
+from jaxveh._core.errors import InputError, word_for
+from jaxveh.io.files import check_readable, write_text
 from jaxveh.io.naming import check_known
 
 SHOWN = 200
@@ -35,6 +36,17 @@ def read_toml(path: Path) -> dict[str, Any]:
             else f" (or no TOML at all, as {path.suffix or 'its name'} suggests{_ELSEWHERE})"
         )
         raise InputError(f"{path}: broken TOML{other}: {error}{_line(text, str(error))}.") from error
+
+
+def write_toml(lines: Iterable[str], path: str | os.PathLike, overwrite: bool, note: str = "") -> None:
+    """Write lines of TOML below a `note`, whose lines become comments; completely or not at all.
+
+    **Raises** `InputError` for a note that is no text, and if the file exists and `overwrite` is False.
+    """
+    if not isinstance(note, str):
+        raise InputError(f"note = {word_for(note)}: must be text, which becomes comment lines at the top of the file.")
+    comments = [f"# {line}".rstrip() for line in note.splitlines()]
+    write_text("\n".join([*comments, *lines]) + "\n", path, overwrite)
 
 
 def _line(text: str, told: str) -> str:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_flags, path_of, word_for
-from jaxveh.io import kit, write_text
+from jaxveh._core.errors import InputError, path_of, word_for
+from jaxveh.io import kit
 from jaxveh.tyres.arctangent import Arctangent
 from jaxveh.tyres.base import AbstractTyre
 from jaxveh.tyres.brush import Brush
@@ -43,14 +43,12 @@ def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", ov
     **Raises** `InputError` for a law that is not in `MODELS`, parameters that are not finite scalars, or an existing file without
     `overwrite`.
     """
-    check_flags(overwrite=overwrite)
     name = type(tyre).__name__
     if MODELS.get(name) is not type(tyre):
         raise InputError(
             f"write_parameters: tyre = {word_for(tyre)}: must be one of {', '.join(MODELS)}; for MFTyre use to_property_file."
         )
-    lines = [f"# {line}".rstrip() for line in note.splitlines()]
-    lines += ["# SI units and radians.", "[tyre]", f"model = {kit.toml_string(name)}"]
+    lines = ["# SI units and radians.", "[tyre]", f"model = {kit.toml_string(name)}"]
     entries = [(field, getattr(tyre, field.name)) for field in dataclasses.fields(tyre)]
     entries = [(field, value) for field, value in entries if value is not None]
     width = max(len(field.name) for field, _ in entries)
@@ -64,7 +62,7 @@ def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", ov
         # The fewest digits that represent this value in its own precision.
         shown, unit = repr(float(str(value[()]))), field.metadata["unit"]
         lines.append(f"{field.name:<{width}} = {shown}" + ("" if unit == "-" else f"  # {unit}"))
-    write_text("\n".join(lines) + "\n", path, overwrite=overwrite)
+    kit.write_toml(lines, path, overwrite, note)
 
 
 def read_parameters(path: str | Path) -> AbstractTyre:

@@ -374,7 +374,7 @@ def _reads(call):
 def test_every_writer_is_tried():
     """Those that call what replaces a file are those of the table above, and those that hand on to one of them."""
     calling = set()
-    names = {"replacing_file", "making_folder", "write_columns", "write_text"}
+    names = {"replacing_file", "making_folder", "write_columns", "write_text", "write_toml"}
     for file in ROOT.rglob("*.py"):
         text = file.read_text("utf-8")
         for function in ast.walk(ast.parse(text)) if any(name in text for name in names) else ():
@@ -382,7 +382,7 @@ def test_every_writer_is_tried():
                 words = {_word(node) for node in ast.walk(function) if isinstance(node, ast.Call)}
                 if words & names:
                     calling.add(function.name)
-    tried = {name.partition(" ")[0] for name in (*WRITERS, *OTHERS)} | {"export_filter", "write_columns"}
+    tried = {name.partition(" ")[0] for name in (*WRITERS, *OTHERS)} | {"export_filter", "write_columns", "write_toml"}
     assert calling == tried
 
 

@@ -10,10 +10,10 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_flags, check_positive, path_of
+from jaxveh._core.errors import InputError, check_positive, path_of
 from jaxveh._core.version import VERSION
 from jaxveh.estimators.geometry.learner import RELATIVE, UNITS, Learner
-from jaxveh.io import kit, write_text
+from jaxveh.io import kit
 
 KEYS = ("value", "std", "unit", "valid")
 
@@ -85,7 +85,6 @@ def write_learned(learned: Learned, path: str | os.PathLike, *, overwrite: bool 
 
     **Raises** `InputError` where the file exists and `overwrite` is False.
     """
-    check_flags(overwrite=overwrite)
     lines = [
         "# Parameters of a car that jaxveh has learned. SI units; valid: the standard deviation is small enough to use them.",
         f"version = {kit.toml_string(VERSION)}",
@@ -93,7 +92,7 @@ def write_learned(learned: Learned, path: str | os.PathLike, *, overwrite: bool 
     for name, entry in learned.entries.items():
         lines += ["", f"[{name}]", f"value = {entry.value!r}", f"std = {entry.std!r}"]
         lines += [f"unit = {kit.toml_string(UNITS[name])}", f"valid = {str(entry.valid).lower()}"]
-    write_text("\n".join(lines) + "\n", path, overwrite)
+    kit.write_toml(lines, path, overwrite)
 
 
 def read_learned(path: str | os.PathLike) -> Learned:
