@@ -12,7 +12,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_finite, check_has, check_kind, path_of
+from jaxveh._core.errors import InputError, check_finite, check_flags, check_has, check_kind, path_of
 from jaxveh._core.parameter import Parameter, put, resolve
 from jaxveh._core.parameters import Parameters
 from jaxveh._core.result import Result, code
@@ -58,6 +58,7 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike, *, over
 
     **Raises** `InputError` where the file exists and `overwrite` is False, or the calibration did not start from a car's file.
     """
+    check_flags(overwrite=overwrite)
     path = path_of(path)
     check_kind("calibration", calibration, Calibration, "The `calibrate` of an estimator makes one.")
     told, fit = calibration.told, calibration.fit

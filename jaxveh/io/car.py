@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_one_of, path_of
+from jaxveh._core.errors import InputError, check, check_flags, check_one_of, path_of
 from jaxveh.io.car_table import CarTable
 from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text, write_toml
 
@@ -235,6 +235,7 @@ def write_car(car: CarSpecification, path: str | os.PathLike, *, note: str = "",
 
     The file is written completely or not at all. **Raises** `InputError` if it exists and `overwrite` is False.
     """
+    check_flags(overwrite=overwrite)
     write_toml(car_lines(car), path, overwrite, note)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_one_of, path_of
+from jaxveh._core.errors import InputError, check, check_flags, check_one_of, path_of
 from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text, write_toml
 
 ROAD_SCHEMA = """\
@@ -98,6 +98,7 @@ def write_road(road: RoadSpecification, path: str | os.PathLike, *, note: str = 
 
     The file is written completely or not at all. **Raises** `InputError` if it exists and `overwrite` is False.
     """
+    check_flags(overwrite=overwrite)
     lines = []
     for entry in fields(road):
         value = getattr(road, entry.name)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, path_of, word_for
+from jaxveh._core.errors import InputError, check_flags, path_of, word_for
 from jaxveh.io import kit
 from jaxveh.tyres.arctangent import Arctangent
 from jaxveh.tyres.base import AbstractTyre
@@ -43,6 +43,7 @@ def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", ov
     **Raises** `InputError` for a law that is not in `MODELS`, parameters that are not finite scalars, or an existing file without
     `overwrite`.
     """
+    check_flags(overwrite=overwrite)
     name = type(tyre).__name__
     if MODELS.get(name) is not type(tyre):
         raise InputError(

@@ -10,7 +10,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_positive, path_of
+from jaxveh._core.errors import InputError, check_flags, check_positive, path_of
 from jaxveh._core.version import VERSION
 from jaxveh.estimators.geometry.learner import RELATIVE, UNITS, Learner
 from jaxveh.io import kit
@@ -85,6 +85,7 @@ def write_learned(learned: Learned, path: str | os.PathLike, *, overwrite: bool 
 
     **Raises** `InputError` where the file exists and `overwrite` is False.
     """
+    check_flags(overwrite=overwrite)
     lines = [
         "# Parameters of a car that jaxveh has learned. SI units; valid: the standard deviation is small enough to use them.",
         f"version = {kit.toml_string(VERSION)}",
