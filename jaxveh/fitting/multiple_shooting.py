@@ -246,7 +246,7 @@ def tie_spread(problem: ShootingProblem, steps):
     """Standard deviation of a jump between segments whose rows lie `steps` (W, K) seconds apart, one (K,) array per state."""
     model, tie, states = problem.model, problem.tie, problem.states
     own = dict(zip(model.states, numerics.sqrt(jnp.diagonal(model.prior.covariance())), strict=True))
-    spread = {name: tie * own[name] * jnp.ones_like(steps[0]) for name in states}
+    spread = {name: numerics.as_wide_as(tie * own[name], steps[0]) for name in states}
     noise = model.process_noise
     if noise is not None:
         # Over the whole window, as if the noise added up without dynamics: the scale of a jump, not its exact law.

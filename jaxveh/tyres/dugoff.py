@@ -47,6 +47,6 @@ class Dugoff(AbstractTwoStiffnesses):
         """The share of friction that remains at the sliding speed."""
         if contact.speed is None:
             raise InputError("contact.speed = None: Dugoff with fading needs the wheel's speed in m/s.")
-        tangent = numerics.tan(contact.slip_angle * jnp.ones_like(like))
-        slides = numerics.hypot(contact.slip_ratio * jnp.ones_like(like), tangent)
+        tangent = numerics.tan(numerics.as_wide_as(contact.slip_angle, like))
+        slides = numerics.hypot(numerics.as_wide_as(contact.slip_ratio, like), tangent)
         return jnp.maximum(1 - self.fading * contact.speed * slides, 0.0)

@@ -36,7 +36,7 @@ class Fiala(AbstractTwoStiffnesses):
         held = limit > 0
         share = F_x / numerics.or_one(limit, held)
         left = limit * numerics.sqrt(jnp.maximum(1 - share**2, LEAST_SHARE))
-        wish = self.cornering_stiffness * numerics.tan(contact.slip_angle * jnp.ones_like(left))
+        wish = self.cornering_stiffness * numerics.tan(numerics.as_wide_as(contact.slip_angle, left))
         q = jnp.abs(wish) / numerics.or_one(left, held)
         sticks = (q < 3) & held
         q = jnp.where(sticks, q, 3.0)

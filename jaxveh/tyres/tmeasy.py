@@ -138,7 +138,7 @@ class TMeasy(AbstractTyre):
         y = _at_load(self.lateral, self.twice_lateral, ratio)
         # The friction m scales slips and forces of the curves equally: F(s) = m F_1(s / m).
         limit = contact.friction * (load / self.nominal_load)
-        grip = jnp.maximum(contact.friction * jnp.ones_like(load), LEAST_GRIP)
+        grip = jnp.maximum(numerics.as_wide_as(contact.friction, load), LEAST_GRIP)
         slip_x, slip_y = (slip / grip for slip in theoretical(contact))
         F_x, F_y = (limit * force for force in _combined_forces(x, y, slip_x, slip_y, AFTER_PEAK[self.after_peak]))
         if self.trail is None:

@@ -39,16 +39,21 @@ def test_several_arrays_have_their_common_shape_and_precision():
     np.testing.assert_array_equal(found, np.full((3, 2), 0.5, np.float32))
 
 
-def is_product_with_zero(node):
-    """Whether a node of a syntax tree is `0.0 * x` or `x * 0`."""
-    product = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult)
-    return product and any(isinstance(side, ast.Constant) and side.value == 0 for side in (node.left, node.right))
+def is_product_for_a_shape(node):
+    """Whether a node of a syntax tree is `0.0 * x` or `jnp.ones_like(x) * y`, or the other way round."""
+    if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult)):
+        return False
+    zero = lambda side: isinstance(side, ast.Constant) and side.value == 0
+    ones = lambda side: isinstance(side, ast.Call) and ast.unparse(side.func).endswith("ones_like")
+    return any(zero(side) or ones(side) for side in (node.left, node.right))
 
 
-def test_no_other_module_multiplies_by_zero_for_a_shape():
-    """A product with zero says neither what it is for nor that a NaN goes through: `jnp.zeros_like` and `as_wide_as` do."""
+def test_no_other_module_multiplies_by_zero_or_ones_for_a_shape():
+    """Such a product says neither what it is for nor that a NaN goes through: `jnp.zeros_like` and `as_wide_as` do."""
     texts = {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in ROOT.rglob("*.py")}
     # To parse all of them takes a second.
-    some = {place: ast.parse(text) for place, text in texts.items() if re.search(r"\b0(\.0*)? \*|\* 0\b", text)}
-    found = {place for place, tree in some.items() if any(map(is_product_with_zero, ast.walk(tree)))}
+    suspects = {
+        name: ast.parse(text) for name, text in texts.items() if re.search(r"\b0(\.0*)? \*|\* 0\b|ones_like\(", text)
+    }
+    found = {place for place, tree in suspects.items() if any(map(is_product_for_a_shape, ast.walk(tree)))}
     assert found == {"numerics/widths.py"}

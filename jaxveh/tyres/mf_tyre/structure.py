@@ -83,7 +83,7 @@ class Structure(AbstractSection):
         share = load / self.FNOMIN
         sinks = self.FNOMIN / self.vertical_stiffness(dp_i)
         sinks = sinks * (self.DREFF * numerics.arctan(self.BREFF * share) + self.FREFF * share)
-        radius = self.UNLOADED_RADIUS * 0.965 * jnp.ones_like(sinks)
+        radius = numerics.as_wide_as(0.965 * self.UNLOADED_RADIUS, sinks)
         for _ in range(RADIUS_ITERATIONS):
             omega = (1 + slip_ratio) * speed / unless_zero(radius)
             grown = self.Q_RE0 + self.Q_V1 * (omega * self.UNLOADED_RADIUS / self.LONGVL) ** 2
@@ -152,7 +152,7 @@ class Structure(AbstractSection):
             root = jnp.where(told, self.Q_A1, guess)
             linear = jnp.where(told, self.Q_A2, 1.693 * guess**2)
             a = self.UNLOADED_RADIUS * (linear * share + root * numerics.sqrt(share))
-            return a, self.WIDTH / 2 * jnp.ones_like(a)
+            return a, numerics.as_wide_as(self.WIDTH / 2, a)
         share = load / (stiffness * self.UNLOADED_RADIUS)
         a = self.UNLOADED_RADIUS * (self.Q_RA2 * share + self.Q_RA1 * numerics.sqrt(share))
         some = share > 0

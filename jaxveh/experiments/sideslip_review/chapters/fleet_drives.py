@@ -161,7 +161,7 @@ def _own_numbers(car: FourteenDOF, channels: dict[str, Any]) -> dict[str, Any]:
         "front_cornering_stiffness": slope("f"), "rear_cornering_stiffness": slope("r"),
         "steering_ratio": jnp.asarray(STEERING_RATIO), "steer_offset": jnp.asarray(STEER_OFFSET),
     }  # fmt: skip
-    return {f"true.{name}": value * jnp.ones_like(like) for name, value in own.items()}
+    return {f"true.{name}": jnp.broadcast_to(value, like.shape) for name, value in own.items()}
 
 
 def slope_at_zero(force, slip):
