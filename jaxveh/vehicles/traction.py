@@ -33,8 +33,8 @@ _END = (1.0 - LEAST_SHARE**2) ** 0.5
 _CORNER = 0.1
 """Half the width of the parabola between the straight line and the limit."""
 
-_LEAST_LIMIT = 1.0
-"""N: the lower bound of the limit in the denominator; so small a limit is that of a lifted wheel."""
+_LEAST_LIMIT = 1e-6
+"""N: the lower bound of the limit in the denominator. So small a limit is that of a lifted wheel, of a model car of 40 g, too."""
 
 
 def saturate(wish: Any) -> Any:
