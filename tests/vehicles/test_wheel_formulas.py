@@ -42,8 +42,8 @@ def test_a_demand_is_met_up_to_nine_tenths_of_the_grip_and_no_further_than_its_e
 
 def test_a_wheel_s_forces_are_on_the_ellipse_of_its_grip():
     given = Forces(F_x=jnp.asarray(0.0), F_y=jnp.asarray(2000.0), M_x=5.0, M_y=6.0, M_z=jnp.asarray(-40.0))
-    for wish, limit in ((1500.0, 3000.0), (-9000.0, 3000.0), (0.3, 0.5)):
-        s = float(saturate(jnp.asarray(wish / max(limit, 1.0))))
+    for wish, limit in ((1500.0, 3000.0), (-9000.0, 3000.0), (0.3, 0.5), (5.0, 0.0)):
+        s = float(saturate(jnp.asarray(wish / max(limit, 1e-6))))
         found, left = within_grip(given, jnp.asarray(wish), jnp.asarray(limit)), (1 - s**2) ** 0.5
         np.testing.assert_allclose(found, (limit * s, 2000.0 * left, 5.0, 6.0, -40.0 * left), rtol=1e-12)
 
