@@ -63,9 +63,9 @@ def _map(chapter: str, labels: list[str], ratios: np.ndarray) -> Any:
         axes.set_yticks(np.arange(len(labels)) + 0.5, labels, fontsize=6)
         axes.set_xticks(np.arange(len(NAMES)) + 0.5, NAMES, fontsize=6, rotation=35, ha="right")
         axes.invert_yaxis()
-        axes.set_title(f"{chapter}: error over that of doing nothing", fontsize=8)
+        axes.set_title(f"{chapter}: median error over that of doing nothing (* is recommended)", fontsize=8)
         ticks = (-3, -2, -1, 0, 1, 2, 3)
         bar = figure.colorbar(mesh, ax=axes, ticks=ticks, pad=0.01, aspect=40)
         bar.ax.set_yticklabels([f"{2.0**tick:g}" for tick in ticks], fontsize=6)
-        bar.set_label("ratio of RMSE, median over seeds [-]; * is recommended", fontsize=6)
+        bar.set_label("ratio of RMSE [-]", fontsize=6)
     return figure
