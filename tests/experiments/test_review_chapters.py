@@ -138,7 +138,13 @@ def test_a_chapter_is_drawn_as_errors_over_those_of_doing_nothing():
     labels, ratios = error_ratios(found, ("sideslip",))
     assert labels == ["sideslip: ekf"] and ratios.shape == (1, len(scenarios.SCENARIOS))
     assert ratios[0, 0] == pytest.approx(0.5) and ratios[0, 1] == pytest.approx(0.75)
-    assert set(chapters.chapter_figures(found)) == {"chapter_lateral_velocity", "chapter_longitudinal_speed"}
+    figures = chapters.chapter_figures(found)
+    assert set(figures) == {"chapter_lateral_velocity", "chapter_longitudinal_speed"}
+    for name, figure in figures.items():
+        figure.draw_without_rendering()
+        for axes in figure.axes:
+            box = axes.get_tightbbox()
+            assert box.y0 >= 0 and box.y1 <= figure.bbox.height and box.x1 <= figure.bbox.width, name
 
 
 @pytest.mark.full
