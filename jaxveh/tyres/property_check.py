@@ -19,7 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh.io import PropertyFile, kit, read_property_file
-from jaxveh.tyres.base import Contact
+from jaxveh.tyres.base import Contact, Forces
 from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.property_file import SIDES, from_property_file, tells
 from jaxveh.tyres.property_lines import PropertyFinding, first_of, odd_lines
@@ -325,7 +325,8 @@ def _outputs(tyre: MFTyre, contact: Contact) -> dict[str, Any]:
 @eqx.filter_jit
 def _forces(tyre: MFTyre, contact: Contact) -> Any:
     """The forces without the moments, which take most of the compilation time."""
-    return tyre.forces(contact)._replace(M_x=0.0, M_y=0.0, M_z=0.0)
+    found = tyre.forces(contact)
+    return Forces(F_x=found.F_x, F_y=found.F_y)
 
 
 def _loads(tyre: MFTyre) -> np.ndarray:
