@@ -22,7 +22,8 @@ from jaxveh.estimators.contract import Calibration, Span
 from jaxveh.estimators.exchange import Exchange
 from jaxveh.estimators.linear_baseline import open_loop, open_loop_of
 from jaxveh.estimators.live import Live, LiveAnswer, LiveBelief
-from jaxveh.estimators.method import AbstractMethod, Answer, Answers, Filtered, LiveMethod, MethodOfCar
+from jaxveh.estimators.method import AbstractMethod, Answer, Answers, Filtered, LiveMethod
+from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.observability import observe, predict_measurements
 from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.state_space import PROCESS_NOISE, START_SPREAD, held_rows, state_space

@@ -1,4 +1,4 @@
-"""The numbers of a car's file that an estimator needs, and the message for those that the file lacks."""
+"""The numbers of a car's file that an estimator needs, the message for those that the file lacks, and those of a usual car."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ from collections.abc import Mapping
 
 from jaxveh._core.errors import InputError
 from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY
+
+USUAL_ROLL_GRADIENT = 0.006
+"""rad/(m/s^2): roll of a usual body on its springs per lateral acceleration."""
 
 
 def keys_of(car: CarSpecification, who: str, keys: Mapping[str, str]) -> dict[str, float]:
@@ -21,6 +25,12 @@ def keys_of(car: CarSpecification, who: str, keys: Mapping[str, str]) -> dict[st
 def number_of(car: CarSpecification, key: str, who: str, unit: str) -> float:
     """One number of a car's file. **Raises** as `keys_of`."""
     return keys_of(car, who, {key: unit})[key]
+
+
+def lean_of(car: CarSpecification) -> float:
+    """By which share (-) the lateral acceleration that the body's accelerometer measures is larger than that in the road's plane,
+    because the body leans: g times the file's `roll_gradient`, or that of a usual car."""
+    return GRAVITY * (USUAL_ROLL_GRADIENT if car.roll_gradient is None else car.roll_gradient)
 
 
 def numbers_in(car: CarSpecification, *keys: str) -> dict[str, float]:

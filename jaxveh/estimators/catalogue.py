@@ -5,9 +5,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from types import ModuleType
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh.estimators.method import AbstractSmoothable, MethodOfCar
+from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable
+from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.io import AxleTyre, CarSpecification
 
 FULL_CAR = CarSpecification(
@@ -33,13 +40,59 @@ def catalogue(quantities: Mapping[str, ModuleType]) -> str:
         lines += ["| --- | --- | --- | --- | --- |"]
         lines += [_row(method, one, module) for method, one in module.METHODS.items()]
         parts.append("\n".join(lines))
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join([*parts, _keys_table(quantities)]) + "\n"
+
+
+def _keys_table(quantities: Mapping[str, ModuleType]) -> str:
+    """A Markdown table of the keys of a car's file: which recommended methods use each."""
+    used = {name: keys_used(module.METHODS[module.RECOMMENDED]) for name, module in quantities.items()}
+    lines = ["## Keys of the car's file", "", "The recommended methods that use each key.", "", "| key | quantities |"]
+    lines += ["| --- | --- |"]
+    for entry in dataclasses.fields(CarSpecification):
+        names = [name for name, keys in used.items() if entry.name in keys]
+        if names:
+            lines.append(f"| `{entry.name}` | {'all' if len(names) == len(used) else ', '.join(names)} |")
+    return "\n".join(lines)
 
 
 def keys_asked(method: MethodOfCar) -> tuple[str, ...]:
     """The optional keys of a car's file without which the method cannot be made."""
     optional = [entry.name for entry in dataclasses.fields(CarSpecification) if entry.default is None]
     return tuple(key for key in optional if not _made(method, dataclasses.replace(FULL_CAR, **{key: None})))
+
+
+def keys_used(method: MethodOfCar) -> tuple[str, ...]:
+    """The keys of a car's file that the method uses: for other values of them it has other numbers, or is another method. Keys of
+    steered rear wheels and names are not among them."""
+    values = {entry.name: getattr(FULL_CAR, entry.name) for entry in dataclasses.fields(FULL_CAR)}
+    numbers = {
+        key: value for key, value in values.items() if not isinstance(value, str) and not key.startswith("rear_steer")
+    }
+    made = method.make(FULL_CAR)
+    others = {
+        key: dataclasses.replace(FULL_CAR, **{key: _another(value)})
+        for key, value in numbers.items()
+        if value is not None
+    }
+    return tuple(key for key, car in others.items() if not _same(made, method.make(car)))
+
+
+def _another(value: Any) -> Any:
+    """A slightly different value of a key."""
+    if isinstance(value, tuple):
+        return tuple(one + 0.1 for one in value)
+    if isinstance(value, AxleTyre):
+        return dataclasses.replace(value, D=0.95 * value.D)
+    return 0.95 * value + (1e-3 if value == 0.0 else 0.0)
+
+
+def _same(one: AbstractMethod, other: AbstractMethod) -> bool:
+    """Whether two methods are of one structure and have the same numbers."""
+    numbers = [jax.tree.leaves(eqx.filter(method, eqx.is_array)) for method in (one, other)]
+    plain = lambda leaf: jax.random.key_data(leaf) if jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key) else leaf
+    return jax.tree.structure(one) == jax.tree.structure(other) and all(
+        np.array_equal(plain(a), plain(b)) for a, b in zip(*numbers, strict=True)
+    )
 
 
 def _made(method: MethodOfCar, car: CarSpecification) -> bool:

@@ -14,7 +14,8 @@ from jaxveh._core.errors import InputError, check_flags, check_has, check_kind, 
 from jaxveh._core.names import as_names
 from jaxveh._core.recording import Recording, check_recording
 from jaxveh.diagnostics import Score, delay, score_band
-from jaxveh.estimators.method import AbstractSmoothable, Answers, method_of
+from jaxveh.estimators.method import AbstractSmoothable, Answers
+from jaxveh.estimators.method_of_car import method_of
 from jaxveh.io import CarSpecification
 
 

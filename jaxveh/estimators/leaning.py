@@ -14,6 +14,7 @@ from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_from_zero, passing_speed
 from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.delays import satellite_lag
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractSmoothable, answer
 from jaxveh.estimators.misfit import Misfit, Roughness, learn_roughness, no_misfit, no_roughness
@@ -258,6 +259,7 @@ def leaning_filter(car: CarSpecification, who: str, **options: Any) -> Leaning:
         rear_axle_to_cg=car.rear_axle_to_cg,
         rear_compliance=car.mass * car.front_axle_to_cg / (car.wheelbase * stiffness),
         roll_gradient=number_of(car, "roll_gradient", who, "rad/(m/s^2)"),
+        delay=satellite_lag(car),
         **numbers_in(car, "roll_frequency", "roll_damping"),
         **{"steering": agreement_of(car, who), **options},
     )

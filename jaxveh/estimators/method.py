@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -25,7 +25,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.contracts import Checked, contract
-from jaxveh._core.errors import InputError, check_kind, check_one_of, word_for
+from jaxveh._core.errors import InputError
 from jaxveh._core.estimated import Estimated
 from jaxveh._core.names import as_mapping, record
 from jaxveh._core.own_results import instance_of, several
@@ -34,8 +34,6 @@ from jaxveh._core.parts import check_parts
 from jaxveh._core.result import Result, code
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning, AsItIs, row_of
-from jaxveh.io import CarSpecification
-from jaxveh.io import kit as io
 from jaxveh.numerics import apart
 from jaxveh.statespace import AbstractFilter, StateSpace, kit
 
@@ -68,6 +66,10 @@ class AbstractMethod(Checked, eqx.Module):
     Everything is a pure function of scalars: a batch is `jax.vmap`. **Raises** `InputError` for a parameter that is not finite,
     or not positive where it must be.
     """
+
+    knows_places: ClassVar[bool] = False
+    """Whether the method itself uses the places of the car's inertial unit and satellite antenna; otherwise it hears the
+    measurements of the centre of gravity (`at_centre.AtCentre`)."""
 
     _contract = contract(needs=_needs, first=_MEMORY_AND_ANSWER, next=_MEMORY_AND_ANSWER)
 
@@ -105,15 +107,6 @@ class AbstractSmoothable(AbstractMethod):
     @abc.abstractmethod
     def say(self, memory: Any) -> Answer:
         """The answer to the row of this memory, by the belief in it."""
-
-
-class MethodOfCar(NamedTuple):
-    """How to make a method from a car's file (**raises** `InputError` for a key missing from the file), its description in one
-    line, and its source."""
-
-    make: Callable[[CarSpecification], AbstractMethod]
-    help: str
-    source: str
 
 
 class Answers(Estimated, eqx.Module):
@@ -190,30 +183,6 @@ class Filtered(AbstractMethod):
             {name: getattr(mean, name) for name in names}, {name: getattr(std, name) for name in names}, known
         )
         return said._replace(result=jnp.where(well, said.result, info.result))
-
-
-TURNING = ("steer", "steering_wheel", "steering_torque", "yaw_rate", "a_y")
-"""Channels that describe how a car turns."""
-
-
-def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: str) -> AbstractMethod:
-    """The method of a name for a car's file, or the source itself if it is a method. **Raises** `InputError` for an unknown
-    name, for methods that are no `MethodOfCar` or make none, and for a car with steered rear wheels unless the method reads no
-    channel of `TURNING`."""
-    if isinstance(source, AbstractMethod):
-        return source
-    check_one_of(f"{who}: method", name, methods)
-    if not isinstance(source, CarSpecification):
-        raise InputError(
-            f"{who}: source = {word_for(source)}: must be an io.CarSpecification, which io.read_car reads, or a method."
-        )
-    entry, place = methods[name], f"{who}: METHODS[{name!r}]"
-    check_kind(place, entry, MethodOfCar, "Such as MethodOfCar(lambda car: Mine(), 'what it is', 'its source').")
-    method = entry.make(source.with_front_steering())
-    check_kind(f"{place}.make(car)", method, AbstractMethod, "Derive it from estimators.AbstractMethod.")
-    if any(need.channel in TURNING for need in method.needs):
-        io.check_front_steered(source, f"{who}: {name}")
-    return method
 
 
 def dtype_of(method: AbstractMethod) -> Any:

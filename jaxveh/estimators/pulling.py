@@ -23,12 +23,13 @@ from jaxveh.estimators.body_motion import (
 )
 from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.delays import satellite_lag
 from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractSmoothable, answer
 from jaxveh.estimators.misfit import Misfit, Roughness, learn_roughness, no_misfit, no_roughness
 from jaxveh.estimators.sequential import Belief, Measurement, belief_of, correct_by_each, move, spread_of
-from jaxveh.estimators.sliding import Sliding
+from jaxveh.estimators.sliding import Sliding, indications_of_sliding
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -313,6 +314,8 @@ def pulling_filter(car: CarSpecification, who: str, **options: Any) -> Pulling:
         rear_axle_to_cg=car.rear_axle_to_cg,
         wheelbase=car.wheelbase,
         rear_compliance=compliance,
+        sliding=indications_of_sliding(car),
+        delay=satellite_lag(car),
         **numbers_in(car, "wheel_inertia", "drag", "rolling_resistance", "pitch_gradient"),
         **options,
     )

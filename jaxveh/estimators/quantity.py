@@ -9,7 +9,8 @@ import numpy as np
 
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.following import follow
-from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, method_of
+from jaxveh.estimators.method import Answers, LiveMethod
+from jaxveh.estimators.method_of_car import MethodOfCar, method_of
 from jaxveh.io import CarSpecification
 
 

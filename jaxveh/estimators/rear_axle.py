@@ -99,7 +99,7 @@ class RearAxle(AbstractTwoAxles):
     grip: jax.Array = positive("-", default=1.0)
     shape: jax.Array = positive("-", default=2.0)
     yaw_rate_offset: jax.Array = parameter("rad/s", scale=0.005, default=0.0)
-    a_y_gain: jax.Array = positive("-", default=1.03)
+    a_y_gain: jax.Array = positive("-", default=1.06)
     a_y_offset: jax.Array = parameter("m/s^2", scale=0.2, default=0.0)
     sensor_x: jax.Array = parameter("m", default=0.0)
     sensor_y: jax.Array = parameter("m", default=0.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from jaxveh._core.errors import InputError
+from jaxveh.estimators.car_file import lean_of
 from jaxveh.estimators.rear_axle import USUAL_WHEELBASE, RearAxle
 from jaxveh.io import CarSpecification
 from jaxveh.io import kit as io
@@ -19,12 +20,13 @@ GRIP = 1.0
 
 SPREADS = {
     "stiffness": 0.3, "grip": 0.3, "shape": 0.25, "yaw_inertia": 0.15, "cg_height": 0.25,
-    "a_y_gain": 0.03, "a_y_offset": 1.0, "yaw_rate_offset": 1.0, "heading_offset": 1.0,
+    "a_y_gain": 0.045, "a_y_offset": 1.0, "yaw_rate_offset": 1.0, "heading_offset": 1.0,
     "bank": 0.7, "slip_error": 0.7, "force_noise": 0.7, "slip_noise": 0.7,
     "process_noise.law.std.v_y": 0.3, "process_noise.law.std.stiffening": 0.5,
 }  # fmt: skip
 """Relative standard deviations by name, on each parameter's real line (unbounded ones in units of their declared scale).
-Those of stiffness and inertia are the usual errors of car files; those of the noises are wide."""
+Those of stiffness and inertia are the usual errors of car files; those of the noises are wide. That of `a_y_gain` contains a
+race car (1.01) and a soft saloon (1.12) where a file has no `roll_gradient`."""
 
 TIMING = 0.01
 """s: the standard deviation of what is left of the delay of a_y against the yaw rate, for a car of the usual size. Clocks and
@@ -87,7 +89,7 @@ def car_of(car: CarSpecification | RearAxle) -> RearAxle:
     sensor_x, sensor_y, _ = car.sensor_position or (0.0, 0.0, 0.0)
     late = 0.0 if car.low_pass is None else LowPass(car.low_pass).delay
     return RearAxle(
-        sensor_delay=late, sensor_x=sensor_x, sensor_y=sensor_y,
+        sensor_delay=late, sensor_x=sensor_x, sensor_y=sensor_y, a_y_gain=1.0 + lean_of(car),
         mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=a, rear_axle_to_cg=b,
         cg_height=car.cg_height or CG_HEIGHT_SHARE * (a + b),
         stiffness=stiffness / load, grip=grip / load,

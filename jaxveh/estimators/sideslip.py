@@ -26,7 +26,8 @@ from jaxveh.estimators.following import follow
 from jaxveh.estimators.front_axle import front_axle
 from jaxveh.estimators.linear_baseline import do_nothing
 from jaxveh.estimators.live import Live
-from jaxveh.estimators.method import AbstractMethod, Answers, LiveMethod, method_of
+from jaxveh.estimators.method import AbstractMethod, Answers, LiveMethod
+from jaxveh.estimators.method_of_car import method_of
 from jaxveh.estimators.parameter_bands import Members, estimate_with_members, members_of_fit, members_of_prior
 from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
@@ -245,6 +246,7 @@ def fitted_car(
         cg_height=float(fitted.cg_height),
         rear=rear,
         rear_cornering_stiffness=stiffness,
+        roll_gradient=max(float(fitted.a_y_gain) - 1.0, 0.0) / GRAVITY,
     )
     recordings = [recording] if isinstance(recording, Recording) else recording
     recordings = [with_road_steer(car, one) for one in recordings]

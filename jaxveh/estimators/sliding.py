@@ -11,6 +11,8 @@ import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.body_motion import away_from_zero
+from jaxveh.estimators.car_file import numbers_in
+from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 from jaxveh.vehicles import kit as vehicles
 
@@ -88,3 +90,10 @@ class Sliding(eqx.Module):
         calm = jnp.max(jnp.abs(beyond)) < 2.0 * self.usual_along
         usual = usual + jnp.where(calm, heard["dt"] / (self.learning + heard["dt"]), 0.0) * beyond
         return fast * jnp.max(jnp.maximum(jnp.abs(beyond) - self.usual_along, 0.0)), usual
+
+
+def indications_of_sliding(car: CarSpecification) -> Sliding:
+    """The indications for a car's file."""
+    tracks = [track for track in (car.track_front, car.track_rear) if track is not None]
+    half = {"half_track": 0.5 * sum(tracks) / len(tracks)} if tracks else {}
+    return Sliding(**half, **numbers_in(car, "roll_gradient"))

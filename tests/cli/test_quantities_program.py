@@ -157,7 +157,8 @@ All quantities of `jaxveh estimate --what` and `jaxveh.estimators`. Bold is the 
 - *from*: section, equation and reference in the review of Chen, Gao & Xu (2013); `mass-grade-aukf` is the paper on mass and grade
   ([papers](papers.md)).
 - *reads*: the channels; those in brackets may be missing, `*` stands for the four wheels.
-- *asks for*: optional keys of the car's file that the method cannot do without.
+- *asks for*: optional keys of the car's file that the method cannot do without. It uses more keys, if they are there: [the
+  last table](#keys-of-the-cars-file) has those of the recommended methods.
 
 This page is generated from the methods' declarations.
 

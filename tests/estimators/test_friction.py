@@ -63,7 +63,7 @@ def lateral_drive(mu, steer, forces=similar_axles, lean=True):
     """A single track on these axle forces, as sensors without errors show it; everything in one age."""
 
     _, (yaw_rate, a_y, front) = driven(forces, jnp.broadcast_to(jnp.asarray(mu, float), T.shape), jnp.asarray(steer))
-    shows = 1.0 + 9.81 * float(PLANAR.roll_gradient) * lean
+    shows = 1.0 + float(PLANAR.lean) * lean
     # Inertial sensors are later than the steer by what the methods allow for.
     late = lambda values: np.interp(T - 0.025, T, np.asarray(values))
     return {

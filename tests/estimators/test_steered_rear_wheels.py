@@ -9,7 +9,7 @@ from test_every_method import QUANTITIES
 
 from jaxveh import InputError, Recording, diagnostics, estimators, vehicles
 from jaxveh.estimators.linear_baseline import open_loop
-from jaxveh.estimators.method import TURNING, method_of
+from jaxveh.estimators.method_of_car import TURNING, method_of
 
 REFUSAL = (
     r'steering = "rear", but the equations used here hold only for a car with front steering.*estimators.state_space'

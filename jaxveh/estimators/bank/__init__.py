@@ -10,7 +10,7 @@ from __future__ import annotations
 from jaxveh.estimators.bank.observers import disturbance_observer, unknown_input_observer
 from jaxveh.estimators.bank.tseng import tseng_of
 from jaxveh.estimators.leaning import leaning_filter
-from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
 
 NAME = "bank"

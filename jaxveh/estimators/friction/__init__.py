@@ -21,7 +21,7 @@ from jaxveh.estimators.friction.scalar import Follower
 from jaxveh.estimators.friction.slipping_wheels import SidesApart, WheelObserver
 from jaxveh.estimators.friction.stiffness_doubt import with_doubt
 from jaxveh.estimators.friction.wheels import Reconstruction, SlipSlope, WheelSlips
-from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.quantity import constant_of, estimate_of, live_of
 from jaxveh.io import CarSpecification
 from jaxveh.tyres import LuGre

@@ -13,7 +13,6 @@ from jaxveh.estimators.method import Filtered
 from jaxveh.estimators.two_axles import LOWEST
 from jaxveh.filters import Unscented
 from jaxveh.statespace import Continuous, Gaussian, Prior, StateSpace
-from jaxveh.vehicles import GRAVITY
 
 READS = (
     Need("v_x", "m/s", throughout=True),
@@ -73,7 +72,7 @@ def _transition(car: PlanarCar, t0, t1, x, u):
 
 def _observation(car: PlanarCar, t, x, u):
     front, rear = _forces(car, x, u)
-    felt = (front + rear) / car.mass * (1.0 + GRAVITY * car.roll_gradient)
+    felt = (front + rear) / car.mass * (1.0 + car.lean)
     return record_type("Felt", ("yaw_rate", "a_y"))(x.yaw_rate, felt)
 
 

@@ -19,7 +19,6 @@ from jaxveh.estimators.friction.motion import Told, next_told, start_told
 from jaxveh.estimators.friction.scalar import Follower
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.two_axles import LATERAL
-from jaxveh.vehicles import GRAVITY
 
 LEAST_FORCE = 0.15
 """Share of the axle's limit on dry road: a linear force below this does not show whether the curve bends."""
@@ -48,14 +47,14 @@ class Axles(eqx.Module):
 
     def start(self, t, values) -> AxlesTold:
         """The memory after the first row."""
-        told, zero = start_told(t, values), jnp.zeros_like(t)
+        told, zero = start_told(t, values, self.car.late), jnp.zeros_like(t)
         known = lambda name: jnp.where(jnp.isnan(values[name]), zero, values[name])
         return AxlesTold(told, told.steer, known("yaw_rate"), known("a_y"), known("yaw_rate"), known("a_y"))
 
     def next(self, last: AxlesTold, t, values) -> AxlesTold:
         """The memory after the next row."""
         dt = jnp.clip(t - last.told.t, 0.0, 1.0)
-        told = next_told(last.told, t, values)
+        told = next_told(last.told, t, values, self.car.late)
         # The bilinear low-pass filter, whose exact derivative is `(x - slow) / lag`.
         share = dt / (2.0 * self.lag + dt)
         held = lambda name, old: jnp.where(jnp.isnan(values[name]), old, values[name])
@@ -69,7 +68,7 @@ class Axles(eqx.Module):
     def forces(self, now: AxlesTold):
         """The lateral forces of front and rear axle, N."""
         turn = (now.last_yaw_rate - now.yaw_rate) / self.lag
-        return self.car.axle_forces(now.a_y / (1.0 + GRAVITY * self.car.roll_gradient), turn)
+        return self.car.axle_forces(now.a_y / (1.0 + self.car.lean), turn)
 
     def slip_difference(self, now: AxlesTold):
         """The front slip angle less the rear slip angle, rad."""

@@ -18,7 +18,6 @@ from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.misfit import Misfit, learn_misfit, no_misfit
 from jaxveh.estimators.sequential import implicit_step
 from jaxveh.estimators.two_axles import LATERAL
-from jaxveh.vehicles import GRAVITY
 
 State = record_type(
     "BankState",
@@ -27,6 +26,9 @@ State = record_type(
 """Lateral velocity (m/s), yaw rate (rad/s), relative stiffness errors of both axles, the offset of a_y (m/s^2), the error of the
 steer that comes and goes (rad), the relative increase of the measured a_y because the body leans, and the offset of the steer
 that stays (rad)."""
+
+LEAN_SPREAD = 0.059
+"""Standard deviation of the share by which the measured a_y is larger because the body leans."""
 
 STEER_TIME = 3.0
 """s: time constant of an error of the measured steer, most of which is the play of the steering."""
@@ -121,11 +123,11 @@ class FrictionBank(AbstractMethod):
         along = None if self.along is None else self.along.start(t)
         # It begins with the noises below, with which its numbers were chosen.
         misfit = no_misfit(2, t, first=1.0, seconds=0.5)
-        return self._said(BankMemory(start_told(t, values), bank, along, jnp.zeros_like(t), misfit), 0.0)
+        return self._said(BankMemory(start_told(t, values, self.car.late), bank, along, jnp.zeros_like(t), misfit), 0.0)
 
     def next(self, memory, t, values):
         dt = jnp.clip(t - memory.told.t, 0.0, 1.0)
-        told = next_told(memory.told, t, values)
+        told = next_told(memory.told, t, values, self.car.late)
         bank = self._mix(memory.bank, dt)
         moved = self._move(bank, told, dt)
         moved, likelihoods, misfit = self._correct(moved, told, values, dt, memory.misfit)
@@ -149,10 +151,10 @@ class FrictionBank(AbstractMethod):
 
     def _start(self):
         """The means (K, 8) and covariances (K, 8, 8) before the first row."""
-        leaning, soft = GRAVITY * self.car.roll_gradient, self.stiffness_spread
+        leaning, soft = self.car.lean, self.stiffness_spread
         spread = State(
             v_y=0.5, yaw_rate=0.1, soft_front=soft, soft_rear=soft, a_y_offset=0.15, steer_error=self.steer_noise,
-            leaning=leaning, steer_offset=self.offset_spread,
+            leaning=LEAN_SPREAD, steer_offset=self.offset_spread,
         )  # fmt: skip
         mean = State(*[jnp.zeros_like(leaning)] * len(spread))._replace(leaning=leaning)
         every = lambda one: jnp.repeat(one[None], len(self.frictions), axis=0)
@@ -258,7 +260,7 @@ class FrictionBank(AbstractMethod):
     def _carried(self, told: Told, a_y, dt):
         """Logarithms (K,) of how likely each friction carries the accelerations of this row."""
         most = self.frictions * (self.car.front.peak + self.car.rear.peak) / self.car.mass
-        a_y = jnp.where(jnp.isnan(a_y), 0.0, a_y) / (1.0 + GRAVITY * self.car.roll_gradient)
+        a_y = jnp.where(jnp.isnan(a_y), 0.0, a_y) / (1.0 + self.car.lean)
         excess = jnp.maximum(numerics.hypot(told.a_x, a_y) - SLOPES - most, 0.0)
         return -0.5 * jnp.minimum(dt / LASTING, 1.0) * jnp.square(excess / (3.0 * self.a_y_noise))
 

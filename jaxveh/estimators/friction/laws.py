@@ -8,6 +8,8 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.car_file import lean_of
+from jaxveh.estimators.delays import unit_lag
 from jaxveh.estimators.friction import brush_curve
 from jaxveh.estimators.two_axles import AbstractAxleForces
 from jaxveh.io import CarSpecification
@@ -16,9 +18,6 @@ from jaxveh.vehicles import GRAVITY
 
 LEAST_FRICTION = 0.02
 """Lower limit of the friction by which a slip is divided."""
-
-ROLL_GRADIENT = 0.006
-"""rad s^2/m: roll angle of an ordinary body per lateral acceleration, used for every car instead of the file's value."""
 
 
 class SimilarCurve(eqx.Module):
@@ -71,7 +70,10 @@ class SimilarCurve(eqx.Module):
 
 
 class PlanarCar(AbstractAxleForces):
-    """The car's parameters that the methods need, each a leaf; `planar_car` has defaults for those that a file may lack."""
+    """The car's parameters that the methods need, each a leaf; `planar_car` has defaults for those that a file may lack.
+
+    `lean` (-): by which share the measured lateral acceleration is larger because the body leans; `late` (s): the delay of the
+    inertial sensors against the steering angle sensor."""
 
     front: SimilarCurve
     rear: SimilarCurve
@@ -79,7 +81,8 @@ class PlanarCar(AbstractAxleForces):
     half_track: jax.Array = positive("m")
     front_drive: jax.Array = parameter("-", scale=0.5)
     front_brake: jax.Array = parameter("-", scale=0.5)
-    roll_gradient: jax.Array = parameter("rad s^2/m", scale=0.005)
+    lean: jax.Array = parameter("-", scale=0.05)
+    late: jax.Array = positive("s")
     steer_offset: jax.Array = parameter("rad", scale=0.003, default=0.0)
 
     def static_loads(self):
@@ -113,7 +116,7 @@ def planar_car(car: CarSpecification) -> PlanarCar:
         mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=car.front_axle_to_cg,
         rear_axle_to_cg=car.rear_axle_to_cg, cg_height=told(car.cg_height, 0.55), half_track=0.5 * sum(tracks) / len(tracks),
         front=curves[0], rear=curves[1], front_drive=told(car.front_drive, 0.5), front_brake=told(car.front_brake, 0.65),
-        roll_gradient=ROLL_GRADIENT, steer_offset=told(car.steer_offset, 0.0),
+        lean=lean_of(car), late=unit_lag(car), steer_offset=told(car.steer_offset, 0.0),
     )  # fmt: skip
 
 

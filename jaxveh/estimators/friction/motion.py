@@ -8,9 +8,6 @@ import jax.numpy as jnp
 
 from jaxveh.estimators.two_axles import LONGEST, LOWEST
 
-LAG = 0.025
-"""s: delay of the inertial sensors against the steering angle sensor, their low-pass filter included."""
-
 
 class Told(NamedTuple):
     """The last row: its time `t` (s), `v_x` (m/s, never below `LOWEST`), `steer` (rad) with the delay of the inertial sensors,
@@ -29,14 +26,16 @@ class Told(NamedTuple):
     moves: Any
 
 
-def start_told(t, values) -> Told:
-    """The motion after the first row."""
+def start_told(t, values, late) -> Told:
+    """The motion after the first row; `late` as in `next_told`."""
     zero, old = jnp.zeros_like(t), jnp.full_like(t, 1e3)
-    return next_told(Told(t, zero + LOWEST, zero, zero, zero, zero, old, old, old, jnp.asarray(False)), t, values)
+    start = Told(t, zero + LOWEST, zero, zero, zero, zero, old, old, old, jnp.asarray(False))
+    return next_told(start, t, values, late)
 
 
-def next_told(last: Told, t, values) -> Told:
-    """The motion after the next row."""
+def next_told(last: Told, t, values, late) -> Told:
+    """The motion after the next row. `late` (s): the delay of the inertial sensors against the steering angle sensor, their
+    low-pass filter included."""
     dt = jnp.clip(t - last.t, 0.0, 1.0)
     v_x, speed_age = _held(values["v_x"], last.raw_v_x, last.speed_age, dt)
     raw_steer, steer_age = _held(values["steer"], last.raw_steer, last.steer_age, dt)
@@ -44,8 +43,8 @@ def next_told(last: Told, t, values) -> Told:
     silent = jnp.isnan(values["yaw_rate"]) | jnp.isnan(values["a_y"])
     inertial_age = jnp.where(silent, last.inertial_age + dt, 0.0)
     fresh = (speed_age <= LONGEST) & (steer_age <= LONGEST) & (inertial_age <= LONGEST)
-    late = last.steer + (raw_steer - last.steer) * (1.0 - jnp.exp(-dt / LAG))
-    steer = jnp.where(last.steer_age > LONGEST, raw_steer, late)
+    delayed = last.steer + (raw_steer - last.steer) * (1.0 - jnp.exp(-dt / late))
+    steer = jnp.where(last.steer_age > LONGEST, raw_steer, delayed)
     moves = fresh & (v_x >= LOWEST)
     return Told(t, jnp.maximum(v_x, LOWEST), steer, a_x, v_x, raw_steer, speed_age, steer_age, inertial_age, moves)
 

@@ -47,12 +47,15 @@ class WheelSlips(eqx.Module):
     def start(self, t, values) -> WheelMemory:
         """The memory after the first row."""
         return WheelMemory(
-            start_told(t, self._straight(t, values)), self.wheels.start(t), jnp.zeros_like(t), jnp.zeros_like(t)
+            start_told(t, self._straight(t, values), self.car.late),
+            self.wheels.start(t),
+            jnp.zeros_like(t),
+            jnp.zeros_like(t),
         )
 
     def next(self, last: WheelMemory, t, values) -> tuple[WheelMemory, Slips]:
         """The memory after the next row, and the wheels' slips and forces."""
-        told = next_told(last.told, t, self._straight(t, values))
+        told = next_told(last.told, t, self._straight(t, values), self.car.late)
         wheels = self.wheels.next(last.wheels, t, values, told)
         held = lambda name, old: jnp.where(jnp.isnan(values[name]), old, values[name])
         yaw_rate, a_y = held("yaw_rate", last.yaw_rate), held("a_y", last.a_y)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from jaxveh.estimators.geometry.learned import Learned, numbers_learned, read_learned, start_from, write_learned
 from jaxveh.estimators.geometry.learner import UNITS, learner_of
-from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.quantity import constant_of, estimate_of, live_of
 
 NAME = "geometry"

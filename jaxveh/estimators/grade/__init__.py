@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from jaxveh.estimators.grade.kinematic import Climb, kinematic_of, satellite_of
 from jaxveh.estimators.joint import joint_filter
-from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.pulling import pulling_filter
 from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from jaxveh.estimators.joint import joint_filter
 from jaxveh.estimators.mass.forgetting import forgetting_factors
 from jaxveh.estimators.mass.ratios import Gated, HighPass, KinematicGrade, ratio_of
-from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.pulling import pulling_filter
 from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.navigation.method import Navigation, navigation_model
 from jaxveh.estimators.navigation.multi_rate import multi_rate_of
 from jaxveh.estimators.navigation.of_car import navigation, navigation_of

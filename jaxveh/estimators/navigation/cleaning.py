@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh.estimators.at_centre import LONGEST_SILENCE, moved_to_centre
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.misfit import Roughness, learn_roughness, no_roughness
 from jaxveh.estimators.navigation.system import BALANCE, ROLLS, STANDS, Navigator, Parts, channels_of, misfit_of
@@ -19,9 +20,6 @@ MORE = ("a_z", "roll_rate", "pitch_rate")
 
 SMOOTH = 0.03
 """s: time constant of the low-pass filter that differentiates the yaw rate to the yaw acceleration."""
-
-LONGEST_SILENCE = 0.25
-"""s: after a longer gap of the inertial unit the navigation must restart."""
 
 
 class Felt(NamedTuple):
@@ -98,12 +96,9 @@ class Cleaning(AbstractCleaning):
 
     def _at_centre(self, held, yaw_acceleration) -> dict[str, Any]:
         """Accelerations of the centre of gravity in a plane motion; other channels unchanged."""
-        turns = jnp.square(held["yaw_rate"])
-        moved = {
-            "a_x": held["a_x"] + yaw_acceleration * self.system.unit_y + turns * self.system.unit_x,
-            "a_y": held["a_y"] - yaw_acceleration * self.system.unit_x + turns * self.system.unit_y,
-        }
-        return held | moved
+        place = self.system.unit_x, self.system.unit_y
+        a_x, a_y = moved_to_centre(held["a_x"], held["a_y"], held["yaw_rate"], yaw_acceleration, *place)
+        return held | {"a_x": a_x, "a_y": a_y}
 
     def _window(self, window: Window, before, now, dt, lost) -> Window:
         middle = lambda name: 0.5 * (before[name] + now[name])

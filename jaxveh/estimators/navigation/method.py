@@ -4,7 +4,7 @@ unit."""
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -72,13 +72,15 @@ class Navigation(AbstractMethod):
     go forwards.
 
     During an outage of the satellites the filter integrates the inertial unit; what is `known` follows from the standard
-    deviations (`ENOUGH`). If the inertial unit has no measurement for longer than `cleaning.LONGEST_SILENCE`, velocity and yaw
+    deviations (`ENOUGH`). If the inertial unit has no measurement for longer than `at_centre.LONGEST_SILENCE`, velocity and yaw
     are lost, and the next fix restarts them. By how much the variances of the channels exceed those of the model is learned from
     `info.innovation`, their `Misfit`.
     """
 
     model: StateSpace
     filter: kit.AbstractRuleFilter = Extended()
+
+    knows_places: ClassVar[bool] = True
 
     @property
     def _cleaning(self) -> Cleaning:

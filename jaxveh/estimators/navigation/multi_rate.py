@@ -9,9 +9,9 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.delays import satellite_lag
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractMethod, Answer, Filtered
-from jaxveh.estimators.navigation.of_car import satellite_lag
 from jaxveh.filters import Delayed, Extended
 from jaxveh.io import CarSpecification
 from jaxveh.statespace import Continuous, Gaussian, Prior, StateSpace

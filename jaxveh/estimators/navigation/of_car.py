@@ -6,16 +6,12 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from jaxveh.estimators.delays import camera_lag, satellite_lag, unit_lag
 from jaxveh.estimators.navigation.method import Navigation, navigation_model
 from jaxveh.estimators.navigation.system import PLAIN, Navigator, Parts
 from jaxveh.io import AxleTyre, CarSpecification
+from jaxveh.statespace import start_from
 from jaxveh.vehicles import GRAVITY
-
-SATELLITE_DELAY, CAMERA_DELAY, UNIT_DELAY = 0.15, 0.08, 0.01
-"""s: usual delays of a series car, for a file without them."""
-
-USUAL_LOW_PASS = 15.0
-"""Hz: usual corner frequency of the low-pass filter in its inertial unit."""
 
 USUAL_TRACK = 1.5
 """m: track of the rear wheels, for a file without it."""
@@ -35,16 +31,15 @@ def navigation(parts: Parts) -> Callable[[CarSpecification], Navigation]:
 def navigation_of(car: CarSpecification, parts: Parts = PLAIN, **numbers: Any) -> Navigation:
     """The navigation of a car, with these `parts`; `numbers`: parameters of `Navigator` that are not in the file, by name.
 
-    For a file without `antenna_position` the antenna is at the centre of gravity; missing delays are those of a usual series car,
-    `SATELLITE_DELAY` and so on. `sensor_position` is that of the inertial unit.
+    For a file without `antenna_position` the antenna is at the centre of gravity; missing delays are those of a usual series car
+    (`delays`). `sensor_position` is that of the inertial unit.
     """
-    sensor_lag = unit_lag(car)
     antenna = car.antenna_position or (0.0, 0.0, 0.0)
     unit = car.sensor_position or (0.0, 0.0, 0.0)
     told = {
         "lag": satellite_lag(car),
-        "camera_lag": max(_or(car.camera_delay, CAMERA_DELAY) - sensor_lag, 0.0),
-        "sensor_lag": sensor_lag,
+        "camera_lag": camera_lag(car),
+        "sensor_lag": unit_lag(car),
         **dict(zip(("antenna_x", "antenna_y", "antenna_z"), antenna, strict=True)),
         **dict(zip(("unit_x", "unit_y"), unit[:2], strict=True)),
         "rear_axle_to_cg": car.rear_axle_to_cg,
@@ -54,20 +49,12 @@ def navigation_of(car: CarSpecification, parts: Parts = PLAIN, **numbers: Any) -
         "track": car.track_rear or USUAL_TRACK,
         "cg_height": car.cg_height or USUAL_HEIGHT,
     }
+    if car.pitch_gradient is not None:
+        told["dip_gradient"] = car.pitch_gradient
     if parts.axle != "none":
         told |= _axle(car)
-    return Navigation(navigation_model(Navigator(**{**told, **numbers}, parts=parts)))
-
-
-def unit_lag(car: CarSpecification) -> float:
-    """The delay of the inertial unit, s: its own, and that of a second-order Butterworth low-pass filter for slow signals."""
-    low_pass = USUAL_LOW_PASS if car.low_pass is None else car.low_pass
-    return _or(car.inertial_delay, UNIT_DELAY) + math.sqrt(2.0) / (2.0 * math.pi * low_pass)
-
-
-def satellite_lag(car: CarSpecification) -> float:
-    """The delay of the satellites beyond that of the inertial unit, s."""
-    return max(_or(car.satellite_delay, SATELLITE_DELAY) - unit_lag(car), 0.0)
+    model = navigation_model(Navigator(**{**told, **numbers}, parts=parts))
+    return Navigation(model if car.roll_gradient is None else start_from(model, lean_gradient=car.roll_gradient))
 
 
 def _axle(car: CarSpecification) -> dict[str, float]:
@@ -104,7 +91,3 @@ def _crossing(rising: Callable[[float], float], low: float, high: float) -> floa
         middle = 0.5 * (low + high)
         low, high = (low, middle) if rising(middle) > 0 else (middle, high)
     return 0.5 * (low + high)
-
-
-def _or(value: float | None, usual: float) -> float:
-    return usual if value is None else value

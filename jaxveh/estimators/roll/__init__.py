@@ -9,7 +9,7 @@ measures it less a share of the yaw rate if the car points up or down.
 from __future__ import annotations
 
 from jaxveh.estimators.leaning import leaning_filter
-from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
 from jaxveh.estimators.roll.gyro import gyro_of
 from jaxveh.estimators.roll.six_axis import six_axis_of

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from jaxveh import filters
-from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.sideslip_methods.four_wheels import roll_3dof, roll_4dof, two_track
 from jaxveh.estimators.sideslip_methods.fusion import by_fuzzy_rules, by_switch, pseudo_integration, weighted_mean
 from jaxveh.estimators.sideslip_methods.integration import direct_integration, roll_compensated

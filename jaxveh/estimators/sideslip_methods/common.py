@@ -93,6 +93,10 @@ class Guarded(AbstractMethod):
     def needs(self):
         return self.inner.needs
 
+    @property
+    def knows_places(self):
+        return self.inner.knows_places
+
     def first(self, t, values):
         none = jnp.zeros_like(t)
         there = {name: ~jnp.isnan(values[name]) for name in {*self.hears, *self.holds}}

@@ -3,6 +3,8 @@ uncertainty of the car's file."""
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning
 from jaxveh.estimators.live import Live, live_init, live_step
 from jaxveh.estimators.method import AbstractMethod, answer
@@ -19,6 +21,8 @@ class AsLive(AbstractMethod):
     of its bands."""
 
     live: Live
+
+    knows_places: ClassVar[bool] = True
 
     @property
     def needs(self):

@@ -6,11 +6,11 @@ camber thrust, compliance, roll steer. The methods start from the values of the 
 
 from __future__ import annotations
 
-from jaxveh.estimators.method import MethodOfCar
+from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
 from jaxveh.estimators.stiffness.least_squares import AxleForces, Derivatives
-from jaxveh.estimators.stiffness.single_track import Followed, linear_car
-from jaxveh.estimators.stiffness.walking import WalkingStiffness
+from jaxveh.estimators.stiffness.single_track import linear_car, signals_of
+from jaxveh.estimators.stiffness.walking import walking_stiffness
 from jaxveh.estimators.stiffness.weighed import weighed_stiffness
 
 NAME = "stiffness"
@@ -25,18 +25,18 @@ METHODS = {
         "section 3.1.2.2, references [46, 47]",
     ),
     "walking": MethodOfCar(
-        lambda car: WalkingStiffness(linear_car(car), Followed()),
+        walking_stiffness,
         "Kalman filter of a linear single track with stiffnesses as slow states, offsets, lean and satellite course; known only "
         "after half a minute of steering",
         "section 3.1.2.2, references [46, 47]",
     ),
     "axle_forces": MethodOfCar(
-        lambda car: AxleForces(linear_car(car), Followed()),
+        lambda car: AxleForces(linear_car(car), signals_of(car)),
         "recursive least squares on axle forces and the difference of slip angles; known only where the yaw rate changes",
         "section 3.1.2.2, equation 15 (F_yr without cosine) and reference [120]",
     ),
     "derivatives": MethodOfCar(
-        lambda car: Derivatives(linear_car(car), Followed(lag=0.3)),
+        lambda car: Derivatives(linear_car(car), signals_of(car, lag=0.3)),
         "the derivative of a force over that of its slip angle at constant speed, biased low by noise; known only where "
         "steer and yaw rate change fast",
         "section 3.1.2.2, equation 16 as corrected, reference [122]",

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.method import AbstractMethod, Answer, answer
-from jaxveh.estimators.stiffness.single_track import LEAN, Followed, LinearCar, Signals
+from jaxveh.estimators.stiffness.single_track import Followed, LinearCar, Signals
 from jaxveh.estimators.two_axles import LATERAL
 
 
@@ -81,7 +81,7 @@ class AxleForces(AbstractLeastSquares):
 
     def follow(self, memory, now, dt):
         turn = (now.yaw_rate - now.slow_yaw_rate) / self.followed.lag
-        front, rear = self.car.axle_forces(now.slow_a_y / (1.0 + LEAN), turn)
+        front, rear = self.car.axle_forces(now.slow_a_y / (1.0 + self.car.lean), turn)
         phi = jnp.stack([
             front / self.car.front_cornering_stiffness, -rear / self.car.rear_cornering_stiffness, jnp.ones_like(front),
             (now.steer - now.slow_steer) / self.followed.lag,
@@ -159,7 +159,7 @@ class Derivatives(AbstractLeastSquares):
     def follow(self, memory, now, dt):
         lag = self.followed.lag
         turn = (now.yaw_rate - now.slow_yaw_rate) / lag
-        a_y = now.slow_a_y / (1.0 + LEAN)
+        a_y = now.slow_a_y / (1.0 + self.car.lean)
         felt = jnp.stack([a_y + self.car.front_axle_to_cg * turn, a_y - self.car.rear_axle_to_cg * turn])
         share = dt / (2.0 * lag + dt)
         # The same low-pass filter once more, so that derivative and value have the same delay.

@@ -9,6 +9,8 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.car_file import lean_of
+from jaxveh.estimators.delays import unit_lag
 from jaxveh.estimators.two_axles import (
     LATERAL,
     LONGEST,
@@ -19,19 +21,19 @@ from jaxveh.estimators.two_axles import (
 )
 from jaxveh.io import CarSpecification
 
-LEAN = 0.059
-"""Relative increase of the measured lateral acceleration because the body leans, for an ordinary car."""
-
 
 class LinearCar(AbstractAxleForces, AbstractLinearAxles):
-    """The parameters of a linear single track; the methods start from its stiffnesses. `steer_offset` (rad): of the channel."""
+    """The parameters of a linear single track; the methods start from its stiffnesses. `steer_offset` (rad): of the channel;
+    `lean` (-): by which share the measured lateral acceleration is larger because the body leans."""
 
     steer_offset: jax.Array = parameter("rad", scale=0.002, default=0.0)
+    lean: jax.Array = parameter("-", scale=0.05, default=0.059)
 
 
 def linear_car(car: CarSpecification) -> LinearCar:
     """The linear single track of a car's file."""
-    return LinearCar(**linear_axles_of(car), yaw_inertia=car.yaw_inertia, steer_offset=car.steer_offset or 0.0)
+    numbers = {"yaw_inertia": car.yaw_inertia, "steer_offset": car.steer_offset or 0.0, "lean": lean_of(car)}
+    return LinearCar(**linear_axles_of(car), **numbers)
 
 
 class Signals(NamedTuple):
@@ -90,3 +92,8 @@ class Followed(eqx.Module):
             last.yaw_rate, yaw_rate),
             follow(last.slow_a_y, last.a_y, a_y), ages, moves,
         )  # fmt: skip
+
+
+def signals_of(car: CarSpecification, lag: float = 0.15) -> Followed:
+    """The signals of a car with the inertial unit of its file."""
+    return Followed(lag, unit_lag(car))

@@ -10,11 +10,13 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.delays import SHORTEST_DELAY, satellite_lag
 from jaxveh.estimators.method import AbstractSmoothable, answer
 from jaxveh.estimators.misfit import Misfit, learn_misfit, no_misfit
 from jaxveh.estimators.sequential import Belief, implicit_step, innovation, update
-from jaxveh.estimators.stiffness.single_track import LEAN, Followed, LinearCar, Signals
+from jaxveh.estimators.stiffness.single_track import Followed, LinearCar, Signals, linear_car, signals_of
 from jaxveh.estimators.two_axles import LATERAL, LOWEST
+from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
 STATES = 11
@@ -105,7 +107,7 @@ class WalkingStiffness(AbstractSmoothable):
 
     def first(self, t, values):
         signals = self.followed.start(t, values)
-        mean = jnp.zeros((STATES,), self.spread.dtype).at[7].set(LEAN).at[10].set(jnp.log(self.grip))
+        mean = jnp.zeros((STATES,), self.spread.dtype).at[7].set(self.car.lean).at[10].set(jnp.log(self.grip))
         zero = jnp.zeros_like(t)
         memory = WalkMemory(signals, Belief(mean, self._start()), zero, zero + 1e3, zero, no_misfit(3, t))
         return memory, self.say(memory)
@@ -114,7 +116,7 @@ class WalkingStiffness(AbstractSmoothable):
         dt, now = self._hear(memory, t, values)
         v_x = jnp.maximum(now.v_x, LOWEST)
         share = 1.0 - jnp.exp(-2.0 * dt / self.course_delay)
-        turning = memory.turning + share * (now.a_y / (1.0 + LEAN) / v_x - memory.turning)
+        turning = memory.turning + share * (now.a_y / (1.0 + self.car.lean) / v_x - memory.turning)
         start = belief = self.ahead(memory, t, values)
         rough = 1.0 + jnp.square(jnp.square(now.a_y / (self.linear * GRAVITY * _grip(belief.mean))))
         felt = lambda x: self._forces(x, now)[2] * (1.0 + x[7]) + x[5]
@@ -207,6 +209,11 @@ class WalkingStiffness(AbstractSmoothable):
         mean = {name: heavier * file[k] * jnp.exp(jnp.clip(x[2 + k], -1.6, 1.6)) for k, name in enumerate(names)}
         known = {name: now.moves & (std[k] < self.known_spread) for k, name in enumerate(names)}
         return answer(mean, {name: mean[name] * std[k] for k, name in enumerate(names)}, known)
+
+
+def walking_stiffness(car: CarSpecification) -> WalkingStiffness:
+    """The method for a car's file."""
+    return WalkingStiffness(linear_car(car), signals_of(car), course_delay=max(satellite_lag(car), SHORTEST_DELAY))
 
 
 def _grip(x: Any) -> Any:

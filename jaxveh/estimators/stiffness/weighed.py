@@ -10,8 +10,7 @@ import jax.scipy.linalg
 from jaxveh.estimators.method import AbstractSmoothable
 from jaxveh.estimators.pulling import OF_THE_TORQUES, Pulling, State, pulling_filter
 from jaxveh.estimators.sequential import Belief
-from jaxveh.estimators.stiffness.single_track import Followed, linear_car
-from jaxveh.estimators.stiffness.walking import OF_THE_MASS, STATES, WalkingStiffness, WalkMemory
+from jaxveh.estimators.stiffness.walking import OF_THE_MASS, STATES, WalkingStiffness, WalkMemory, walking_stiffness
 from jaxveh.io import CarSpecification
 
 LOG_MASS = State._fields.index("log_mass")
@@ -73,7 +72,7 @@ class WeighedStiffness(AbstractSmoothable):
 
 def weighed_stiffness(car: CarSpecification) -> AbstractSmoothable:
     """The method for a car's file; of a file without `wheel_radius`, by which a torque becomes a force, `WalkingStiffness`."""
-    walking = WalkingStiffness(linear_car(car), Followed())
+    walking = walking_stiffness(car)
     return walking if car.wheel_radius is None else WeighedStiffness(walking, pulling_filter(car, "stiffness"))
 
 

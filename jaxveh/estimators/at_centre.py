@@ -1,0 +1,157 @@
+"""Measurements at the centre of gravity, from those of an inertial unit and of a satellite antenna elsewhere in the car."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.delays import satellite_lag
+from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable, Answer
+from jaxveh.estimators.sequential import Belief
+from jaxveh.io import CarSpecification
+
+YAW_RATE, SPEED = Need("yaw_rate", "rad/s", optional=True), Need("speed", "m/s", optional=True)
+
+FELT, SATELLITES = ("a_x", "a_y"), ("speed", "course")
+"""The channels that are moved: of the inertial unit, and of the antenna."""
+
+LONGEST_SILENCE = 0.25
+"""s: a longer gap of the inertial unit is one: a navigation restarts after it, and without a yaw rate nothing is moved."""
+
+SLOWEST = 2.0
+"""m/s: at a lower speed the course is left as it is: its direction is that of the antenna's own motion."""
+
+
+class Turning(NamedTuple):
+    """The last row's time `t` (s); the last yaw rate, the low-passed one, `smooth`, and the one of the satellites' time, `late`
+    (rad/s); since when there was no yaw rate, `silence` (s)."""
+
+    t: Any
+    yaw_rate: Any
+    smooth: Any
+    late: Any
+    silence: Any
+
+
+class MovedMemory(NamedTuple):
+    """The memory of the inner method, the car's `turning`, and the inner method's belief if it can be smoothed."""
+
+    inner: Any
+    turning: Turning
+    belief: Belief | None
+
+
+def moved_to_centre(a_x: Any, a_y: Any, yaw_rate: Any, yaw_acceleration: Any, x: Any, y: Any) -> tuple[Any, Any]:
+    """Accelerations (m/s^2) of the centre of gravity in a plane motion, from those at a place `x` ahead and `y` to the left of it
+    (m)."""
+    turns = jnp.square(yaw_rate)
+    return a_x + yaw_acceleration * y + turns * x, a_y - yaw_acceleration * x + turns * y
+
+
+class AtCentre(AbstractMethod):
+    """A method that hears accelerations, course and speed over ground of the centre of gravity, from those of an inertial unit at
+    (`unit_x`, `unit_y`) and of an antenna at (`antenna_x`, `antenna_y`) (m, forward and left of it).
+
+    The motion is plane: a rolling or pitching body's part, which depends on the heights, is left. The yaw acceleration is the
+    slope of the yaw rate through a low-pass of `smoothing` (s); satellites are late by `lag` (s) against the unit.
+    """
+
+    inner: AbstractMethod
+    unit_x: jax.Array = parameter("m", default=0.0)
+    unit_y: jax.Array = parameter("m", default=0.0)
+    antenna_x: jax.Array = parameter("m", default=0.0)
+    antenna_y: jax.Array = parameter("m", default=0.0)
+    smoothing: jax.Array = positive("s", default=0.03)
+    lag: jax.Array = parameter("s", scale=0.1, default=0.125)
+
+    knows_places: ClassVar[bool] = True
+
+    @property
+    def needs(self):
+        there = {need.channel for need in self.inner.needs}
+        more = (YAW_RATE, SPEED) if "course" in there else (YAW_RATE,)
+        return (*self.inner.needs, *[need for need in more if need.channel not in there])
+
+    def first(self, t, values):
+        nothing = jnp.zeros_like(t)
+        said = jnp.where(jnp.isnan(values["yaw_rate"]), nothing, values["yaw_rate"])
+        start = Turning(t, said, said, said, nothing + 2.0 * LONGEST_SILENCE)
+        turning, moved = self._moved(start, t, values)
+        inner, answer = self.inner.first(t, moved)
+        return self._memory(inner, turning), answer
+
+    def next(self, memory, t, values):
+        turning, moved = self._moved(memory.turning, t, values)
+        inner, answer = self.inner.next(memory.inner, t, moved)
+        return self._memory(inner, turning), answer
+
+    def _memory(self, inner: Any, turning: Turning) -> MovedMemory:
+        return MovedMemory(inner, turning, None)
+
+    def _moved(self, last: Turning, t, values) -> tuple[Turning, dict[str, Any]]:
+        """How the car turns after this row, and the row at the centre of gravity."""
+        dt, said = t - last.t, values["yaw_rate"]
+        yaw_rate = jnp.where(jnp.isnan(said), last.yaw_rate, said)
+        silence = jnp.where(jnp.isnan(said), last.silence + dt, 0.0)
+        anew = last.silence > LONGEST_SILENCE
+        # The bilinear low-pass filter, whose exact derivative is `(x - smooth) / smoothing`.
+        share = dt / (2.0 * self.smoothing + dt)
+        smooth = jnp.where(anew, yaw_rate, last.smooth + share * (yaw_rate + last.yaw_rate - 2.0 * last.smooth))
+        lags = jnp.maximum(self.lag, 1e-6)
+        late = jnp.where(anew, yaw_rate, last.late + (1.0 - jnp.exp(-dt / lags)) * (last.yaw_rate - last.late))
+        turning = Turning(t, yaw_rate, smooth, late, silence)
+        moved = self._felt(turning, values) | self._over_ground(turning, values)
+        return turning, values | {name: value for name, value in moved.items() if name in values}
+
+    def _felt(self, now: Turning, values) -> dict[str, Any]:
+        known, missing = now.silence <= LONGEST_SILENCE, jnp.full_like(now.t, jnp.nan)
+        turns = jnp.where(known, now.yaw_rate, 0.0)
+        quicker = jnp.where(known, (now.yaw_rate - now.smooth) / self.smoothing, 0.0)
+        a_x, a_y = (values.get(name, missing) for name in FELT)
+        moved = moved_to_centre(a_x, a_y, turns, quicker, self.unit_x, self.unit_y)
+        return dict(zip(FELT, moved, strict=True))
+
+    def _over_ground(self, now: Turning, values) -> dict[str, Any]:
+        """Course and speed of the centre of gravity; those of the antenna are of a wider or narrower circle."""
+        if "course" not in values and "speed" not in values:
+            return {}
+        turns, speed = jnp.where(now.silence <= LONGEST_SILENCE, now.late, 0.0), values["speed"]
+        fast = speed > SLOWEST
+        swings = jnp.where(fast, turns * self.antenna_x / jnp.where(fast, speed, 1.0), 0.0)
+        course = values.get("course", jnp.full_like(now.t, jnp.nan))
+        return {"course": course - swings, "speed": speed + jnp.where(fast, turns * self.antenna_y, 0.0)}
+
+
+class SmoothableAtCentre(AtCentre, AbstractSmoothable):
+    """`AtCentre` of a method that can be smoothed."""
+
+    inner: AbstractSmoothable
+
+    def _memory(self, inner, turning):
+        return MovedMemory(inner, turning, inner.belief)
+
+    def ahead(self, memory, t, values) -> Belief:
+        _, moved = self._moved(memory.turning, t, values)
+        return self.inner.ahead(memory.inner._replace(belief=memory.belief), t, moved)
+
+    def say(self, memory) -> Answer:
+        return self.inner.say(memory.inner._replace(belief=memory.belief))
+
+
+def at_centre(method: Any, car: CarSpecification) -> Any:
+    """The method of a car whose inertial unit and antenna are at the file's `sensor_position` and `antenna_position`; the method
+    itself where they are at the centre of gravity, where it knows their places, or reads nothing that depends on them."""
+    if not isinstance(method, AbstractMethod):  # told of by `method_of`
+        return method
+    reads = {need.channel for need in method.needs}
+    of = lambda place, channels: (0.0, 0.0) if place is None or not reads & set(channels) else place[:2]
+    places = (*of(car.sensor_position, FELT), *of(car.antenna_position, SATELLITES))
+    if method.knows_places or not any(places):
+        return method
+    kind = SmoothableAtCentre if isinstance(method, AbstractSmoothable) else AtCentre
+    named = dict(zip(("unit_x", "unit_y", "antenna_x", "antenna_y"), places, strict=True))
+    return kind(method, **named, lag=satellite_lag(car))
