@@ -18,7 +18,15 @@ from jaxveh.cli.drives import read_log
 from jaxveh.cli.log_errors import check_trusted, read_by
 from jaxveh.cli.missing_speed import has_wheels, wants_v_x, with_speed
 from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
-from jaxveh.cli.quantity_options import QUANTITIES, USUAL_FILTER, USUAL_PARTICLES, inputs_of, methods_of, names_of
+from jaxveh.cli.quantity_options import (
+    QUANTITIES,
+    USUAL_FILTER,
+    USUAL_PARTICLES,
+    inputs_of,
+    methods_of,
+    names_of,
+    tell_assumed,
+)
 from jaxveh.cli.several_logs import SeveralLogs
 from jaxveh.cli.vehicle import car_of
 from jaxveh.diagnostics import LogFinding
@@ -98,6 +106,7 @@ def estimate_quantities(asked: Asked, numbers: Path | None) -> None:
     """Estimate the requested quantities along each log, then print, draw and write the results."""
     check_report(asked.out, numbers)
     products, car = _check(asked)
+    tell_assumed(asked.what, asked.methods, asked.vehicle, car)
     several = SeveralLogs(asked.logs)
     told = several.each(lambda log: _log(asked, log, car), {log: log for log in asked.logs})
     with progress("estimate") as report:
@@ -256,18 +265,9 @@ def _print(log: Path, found: dict[str, Shown]) -> None:
             for n, e in shown.nothing.items()
         ]
         columns = (
-            "method",
-            "uses rows",
-            "what",
-            "at the end",
-            "known",
-            "us a step",
-            "rmse",
-            "of it known",
-            "worst",
-            "delay [s]",
+            "method", "uses rows", "what", "at the end", "known", "us a step", "rmse", "of it known", "worst", "delay [s]",
             "in 95 %",
-        )
+        )  # fmt: skip
         width = len(columns) if shown.scores else 6
         if rows:
             table(f"{quantity} along {log.name}", columns[:width], [row[:width] for row in rows], left=3)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from collections.abc import Sequence
+from pathlib import Path
 from types import ModuleType
 from typing import Annotated
 
@@ -11,7 +13,7 @@ import typer
 
 from jaxveh import InputError, estimators
 from jaxveh._core.errors import check_one_of
-from jaxveh.cli.console import table
+from jaxveh.cli.console import results, table
 from jaxveh.io import CarSpecification
 
 QUANTITIES: dict[str, ModuleType] = {
@@ -39,6 +41,19 @@ def inputs_of(what: Sequence[str], methods: Sequence[str] | None, car: CarSpecif
             with contextlib.suppress(InputError):  # a car without a method's numbers is told of by the method
                 found |= {need.channel for need in quantity.METHODS[name].make(car).needs if need.throughout}
     return tuple(sorted(found))
+
+
+def tell_assumed(what: Sequence[str], methods: Sequence[str] | None, file: Path | None, car: CarSpecification) -> None:
+    """Print which keys a car's `file` lacks that these methods of quantities would use: usual values stand for them."""
+    missing = [entry.name for entry in dataclasses.fields(car) if getattr(car, entry.name) is None]
+    used: set[str] = set()
+    for quantity in (QUANTITIES[name] for name in what):
+        for name in methods or (quantity.RECOMMENDED,):
+            used |= {*estimators.kit.keys_used(quantity.METHODS[name], missing)}
+    keys = ", ".join(key for key in missing if key in used)
+    if keys:
+        assumed = f"note: {file} has no {keys}: usual values are assumed (jaxveh schema car explains the keys)."
+        results().print(assumed, markup=False, soft_wrap=True)
 
 
 def names_of(text: str, option: str, known: Sequence[str]) -> tuple[str, ...]:

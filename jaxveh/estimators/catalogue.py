@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import ModuleType
 from typing import Any
 
@@ -28,6 +28,10 @@ FULL_CAR = CarSpecification(
     front=AxleTyre(B=8.0, C=1.3, D=9000.0, E=-0.5), rear=AxleTyre(B=12.0, C=1.3, D=8300.0, E=-0.5),
 )  # fmt: skip
 """A car's file with every key, of which one at a time is left out to find the methods that need it."""
+
+
+REAR_STEER = ("rear_steer_ratio", "rear_steer_ratio_fast", "rear_steer_speed")
+"""Keys of a car with steered rear wheels."""
 
 
 def catalogue(quantities: Mapping[str, ModuleType]) -> str:
@@ -61,20 +65,15 @@ def keys_asked(method: MethodOfCar) -> tuple[str, ...]:
     return tuple(key for key in optional if not _made(method, dataclasses.replace(FULL_CAR, **{key: None})))
 
 
-def keys_used(method: MethodOfCar) -> tuple[str, ...]:
-    """The keys of a car's file that the method uses: for other values of them it has other numbers, or is another method. Keys of
-    steered rear wheels and names are not among them."""
+def keys_used(method: MethodOfCar, among: Iterable[str] | None = None) -> tuple[str, ...]:
+    """The keys of a car's file that the method uses, of all keys or those `among`: for other values of them it has other numbers,
+    or is another method. Keys of steered rear wheels and names are not among them."""
     values = {entry.name: getattr(FULL_CAR, entry.name) for entry in dataclasses.fields(FULL_CAR)}
-    numbers = {
-        key: value for key, value in values.items() if not isinstance(value, str) and not key.startswith("rear_steer")
-    }
+    wanted = values if among is None else among
+    numbers = [key for key in wanted if not (values[key] is None or isinstance(values[key], str) or key in REAR_STEER)]
     made = method.make(FULL_CAR)
-    others = {
-        key: dataclasses.replace(FULL_CAR, **{key: _another(value)})
-        for key, value in numbers.items()
-        if value is not None
-    }
-    return tuple(key for key, car in others.items() if not _same(made, method.make(car)))
+    other = lambda key: method.make(dataclasses.replace(FULL_CAR, **{key: _another(values[key])}))
+    return tuple(key for key in numbers if not _same(made, other(key)))
 
 
 def _another(value: Any) -> Any:

@@ -144,6 +144,16 @@ def test_a_gap_is_told_with_the_option_that_fills_it(drive, methods):
     assert "Fill it with --fill" in words and "recording.fill(" not in words, result.output
 
 
+def test_keys_that_the_car_s_file_lacks_are_told_where_they_would_be_used(drive):
+    plain = dataclasses.replace(method_logs.CAR, roll_gradient=None, drag=None)
+    io.write_car(plain, drive / "car.toml", overwrite=True)
+    words = " ".join(estimate(drive, "--what", "friction", "--methods", "lateral_curve").output.split())
+    told = words.split("car.toml has no ")[1].split(": usual values are assumed")[0].split(", ")
+    assert "roll_gradient" in told and "sensor_position" in told and "drag" not in told and "mass" not in told, told
+    words = " ".join(estimate(drive, "--what", "speed", "--methods", "fastest_wheel", out="other.csv").output.split())
+    assert "usual values" not in words
+
+
 def test_the_catalogue_is_what_the_methods_declare():
     """`python tests/cli/test_quantities_program.py` writes it anew."""
     assert CATALOGUE.read_text() == HEAD + estimators.kit.catalogue(QUANTITIES)
