@@ -45,7 +45,8 @@ def read_by(quantity: ModuleType, name: str, car: CarSpecification, seen: Record
     """Return the channels of the log that a method of a quantity reads, with the sources of a `v_x` that is not measured. An
     optional channel without any value is not read."""
     with contextlib.suppress(InputError):  # a car without a method's numbers is told of by the method
-        needs = quantity.METHODS[name].make(car).needs
+        # Without the channels that only move measurements to the centre of gravity.
+        needs = quantity.METHODS[name].of_centre(car).needs
         empty = {one.channel for one in needs if one.optional and _is_empty(seen, one.channel)}
         read = {one.channel for one in needs} - empty
         return (read & set(seen.names)) | (sources_of_speed(seen, car) if "v_x" in read else set())

@@ -50,7 +50,7 @@ def wants_v_x(quantity: ModuleType, methods: Sequence[str], car: CarSpecificatio
     """Whether one of these methods of a quantity uses `v_x`, and not the speed over ground itself."""
     for name in methods:
         with contextlib.suppress(InputError):
-            used = {need.channel for need in quantity.METHODS[name].make(car).needs}
+            used = {need.channel for need in quantity.METHODS[name].of_centre(car).needs}
             if "v_x" in used and "speed" not in used:
                 return True
     return False

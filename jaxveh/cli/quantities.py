@@ -106,9 +106,10 @@ def estimate_quantities(asked: Asked, numbers: Path | None) -> None:
     """Estimate the requested quantities along each log, then print, draw and write the results."""
     check_report(asked.out, numbers)
     products, car = _check(asked)
-    tell_assumed(asked.what, asked.methods, asked.vehicle, car)
     several = SeveralLogs(asked.logs)
     told = several.each(lambda log: _log(asked, log, car), {log: log for log in asked.logs})
+    channels = {name for one in told.values() for name in one.seen.names}
+    tell_assumed(asked.what, asked.methods, asked.vehicle, car, channels)
     with progress("estimate") as report:
 
         def work(one: Told) -> dict[str, Shown]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated
@@ -33,6 +33,16 @@ FILLED = ("steer", "v_x", "a_x")
 """Channels that `--fill` fills for every quantity; for a method also those that it needs in every row."""
 
 
+SATELLITES = ("speed", "course", "climb_rate", "heading")
+
+OF_DEVICES = {
+    "antenna_position": SATELLITES,
+    "satellite_delay": SATELLITES,
+    "camera_delay": ("lane_offset", "lane_heading"),
+}
+"""Keys of devices that a log may not have, and their channels."""
+
+
 def inputs_of(what: Sequence[str], methods: Sequence[str] | None, car: CarSpecification) -> tuple[str, ...]:
     """Return the channels that `--fill` fills for these methods of quantities; None for the recommended ones."""
     found = set(FILLED)
@@ -43,16 +53,28 @@ def inputs_of(what: Sequence[str], methods: Sequence[str] | None, car: CarSpecif
     return tuple(sorted(found))
 
 
-def tell_assumed(what: Sequence[str], methods: Sequence[str] | None, file: Path | None, car: CarSpecification) -> None:
-    """Print which keys a car's `file` lacks that these methods of quantities would use: usual values stand for them."""
-    missing = [entry.name for entry in dataclasses.fields(car) if getattr(car, entry.name) is None]
+def tell_assumed(
+    what: Sequence[str],
+    methods: Sequence[str] | None,
+    file: Path | None,
+    car: CarSpecification,
+    channels: Collection[str],
+) -> None:
+    """Print which keys a car's `file` lacks that these methods of quantities would use with these `channels` of the logs. Keys
+    without which a method is refused are told of by the method."""
+    missing = [
+        entry.name
+        for entry in dataclasses.fields(car)
+        if getattr(car, entry.name) is None
+        and (entry.name not in OF_DEVICES or {*OF_DEVICES[entry.name]} & {*channels})
+    ]
     used: set[str] = set()
     for quantity in (QUANTITIES[name] for name in what):
-        for name in methods or (quantity.RECOMMENDED,):
-            used |= {*estimators.kit.keys_used(quantity.METHODS[name], missing)}
+        for method in (quantity.METHODS[name] for name in methods or (quantity.RECOMMENDED,)):
+            used |= {*estimators.kit.keys_used(method, missing)} - {*estimators.kit.keys_asked(method)}
     keys = ", ".join(key for key in missing if key in used)
     if keys:
-        assumed = f"note: {file} has no {keys}: usual values are assumed (jaxveh schema car explains the keys)."
+        assumed = f"note: {file} has no {keys}: usual values stand for them (jaxveh schema car explains the keys)."
         results().print(assumed, markup=False, soft_wrap=True)
 
 

@@ -15,26 +15,28 @@ from jaxveh.estimators.sequential import Belief
 from jaxveh.io import CarSpecification
 
 YAW_RATE, SPEED = Need("yaw_rate", "rad/s", optional=True), Need("speed", "m/s", optional=True)
+"""What moves the channels of `FELT` and `SATELLITES`, beside those that a method reads itself."""
 
 FELT, SATELLITES = ("a_x", "a_y"), ("speed", "course")
 """The channels that are moved: of the inertial unit, and of the antenna."""
 
 LONGEST_SILENCE = 0.25
-"""s: a longer gap of the inertial unit is one: a navigation restarts after it, and without a yaw rate nothing is moved."""
+"""s: after a longer gap of the inertial unit a navigation restarts, and how the car turns is unknown: nothing is moved."""
 
-SLOWEST = 2.0
-"""m/s: at a lower speed the course is left as it is: its direction is that of the antenna's own motion."""
+SLOWEST = 1.0
+"""m/s: at a lower speed the course is left as it is; no method uses it there."""
 
 
 class Turning(NamedTuple):
     """The last row's time `t` (s); the last yaw rate, the low-passed one, `smooth`, and the one of the satellites' time, `late`
-    (rad/s); since when there was no yaw rate, `silence` (s)."""
+    (rad/s); since when there was no yaw rate, `silence` (s); the last speed over ground (m/s), or that along the car."""
 
     t: Any
     yaw_rate: Any
     smooth: Any
     late: Any
     silence: Any
+    speed: Any
 
 
 class MovedMemory(NamedTuple):
@@ -79,7 +81,7 @@ class AtCentre(AbstractMethod):
     def first(self, t, values):
         nothing = jnp.zeros_like(t)
         said = jnp.where(jnp.isnan(values["yaw_rate"]), nothing, values["yaw_rate"])
-        start = Turning(t, said, said, said, nothing + 2.0 * LONGEST_SILENCE)
+        start = Turning(t, said, said, said, nothing + 2.0 * LONGEST_SILENCE, nothing)
         turning, moved = self._moved(start, t, values)
         inner, answer = self.inner.first(t, moved)
         return self._memory(inner, turning), answer
@@ -97,15 +99,27 @@ class AtCentre(AbstractMethod):
         dt, said = t - last.t, values["yaw_rate"]
         yaw_rate = jnp.where(jnp.isnan(said), last.yaw_rate, said)
         silence = jnp.where(jnp.isnan(said), last.silence + dt, 0.0)
-        anew = last.silence > LONGEST_SILENCE
-        # The bilinear low-pass filter, whose exact derivative is `(x - smooth) / smoothing`.
-        share = dt / (2.0 * self.smoothing + dt)
-        smooth = jnp.where(anew, yaw_rate, last.smooth + share * (yaw_rate + last.yaw_rate - 2.0 * last.smooth))
-        lags = jnp.maximum(self.lag, 1e-6)
-        late = jnp.where(anew, yaw_rate, last.late + (1.0 - jnp.exp(-dt / lags)) * (last.yaw_rate - last.late))
-        turning = Turning(t, yaw_rate, smooth, late, silence)
+        anew = (last.silence > LONGEST_SILENCE) | (dt > LONGEST_SILENCE)
+
+        def low_pass(before, lag):
+            # Bilinear: its exact derivative is `(x - low) / lag`, and slow signals are late by `lag` at any step.
+            share = dt / (2.0 * lag + dt)
+            return jnp.where(anew, yaw_rate, before + share * (yaw_rate + last.yaw_rate - 2.0 * before))
+
+        smooth, late = (
+            low_pass(last.smooth, self.smoothing),
+            low_pass(last.late, jnp.maximum(self.lag, 0.5 * dt + 1e-6)),
+        )
+        turning = Turning(t, yaw_rate, smooth, late, silence, self._speed(last.speed, values))
         moved = self._felt(turning, values) | self._over_ground(turning, values)
         return turning, values | {name: value for name, value in moved.items() if name in values}
+
+    def _speed(self, last: Any, values) -> Any:
+        """The size of the speed: over ground, or else along the car, or else the last one, m/s."""
+        for name in ("v_x", "speed"):
+            value = values.get(name, jnp.full_like(last, jnp.nan))
+            last = jnp.where(jnp.isnan(value), last, jnp.abs(value))
+        return last
 
     def _felt(self, now: Turning, values) -> dict[str, Any]:
         known, missing = now.silence <= LONGEST_SILENCE, jnp.full_like(now.t, jnp.nan)
@@ -116,14 +130,14 @@ class AtCentre(AbstractMethod):
         return dict(zip(FELT, moved, strict=True))
 
     def _over_ground(self, now: Turning, values) -> dict[str, Any]:
-        """Course and speed of the centre of gravity; those of the antenna are of a wider or narrower circle."""
-        if "course" not in values and "speed" not in values:
-            return {}
-        turns, speed = jnp.where(now.silence <= LONGEST_SILENCE, now.late, 0.0), values["speed"]
-        fast = speed > SLOWEST
-        swings = jnp.where(fast, turns * self.antenna_x / jnp.where(fast, speed, 1.0), 0.0)
-        course = values.get("course", jnp.full_like(now.t, jnp.nan))
-        return {"course": course - swings, "speed": speed + jnp.where(fast, turns * self.antenna_y, 0.0)}
+        """Course and speed of the centre of gravity, as far as they are there; those of the antenna are of a wider or narrower
+        circle, which a car in reverse (negative `v_x`) runs through the other way."""
+        missing = jnp.full_like(now.t, jnp.nan)
+        known = (now.silence <= LONGEST_SILENCE) & (now.speed > SLOWEST)
+        turns = jnp.where(known, now.late, 0.0) * jnp.where(values.get("v_x", missing) < 0.0, -1.0, 1.0)
+        swings = turns * self.antenna_x / jnp.where(known, now.speed, 1.0)
+        course, speed = (values.get(name, missing) for name in ("course", "speed"))
+        return {"course": course - swings, "speed": speed + turns * self.antenna_y}
 
 
 class SmoothableAtCentre(AtCentre, AbstractSmoothable):
@@ -142,14 +156,15 @@ class SmoothableAtCentre(AtCentre, AbstractSmoothable):
         return self.inner.say(memory.inner._replace(belief=memory.belief))
 
 
-def at_centre(method: Any, car: CarSpecification) -> Any:
+def method_at_centre(method: Any, car: CarSpecification) -> Any:
     """The method of a car whose inertial unit and antenna are at the file's `sensor_position` and `antenna_position`; the method
     itself where they are at the centre of gravity, where it knows their places, or reads nothing that depends on them."""
-    if not isinstance(method, AbstractMethod):  # told of by `method_of`
+    if not isinstance(method, AbstractMethod):  # `method_of` raises for it
         return method
     reads = {need.channel for need in method.needs}
-    of = lambda place, channels: (0.0, 0.0) if place is None or not reads & set(channels) else place[:2]
-    places = (*of(car.sensor_position, FELT), *of(car.antenna_position, SATELLITES))
+    unit = car.sensor_position if reads & {*FELT} else None
+    antenna = car.antenna_position if reads & {*SATELLITES} else None
+    places = [coordinate for place in (unit, antenna) for coordinate in (place or (0.0, 0.0))[:2]]
     if method.knows_places or not any(places):
         return method
     kind = SmoothableAtCentre if isinstance(method, AbstractSmoothable) else AtCentre

@@ -103,7 +103,7 @@ def _made(method: MethodOfCar, car: CarSpecification) -> bool:
 
 
 def _row(name: str, method: MethodOfCar, module: ModuleType) -> str:
-    made = method.make(FULL_CAR)
+    made = method.of_centre(FULL_CAR)
     needs = made.needs
     help = f"{method.help} (can be smoothed)" if isinstance(made, AbstractSmoothable) else method.help
     reads = [f"[{need.channel}]" if need.optional else need.channel for need in needs]

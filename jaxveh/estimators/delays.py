@@ -17,7 +17,7 @@ SHORTEST_DELAY = 1e-3
 """s: the least delay where a time is divided by it."""
 
 
-def unit_lag(car: CarSpecification) -> float:
+def unit_delay(car: CarSpecification) -> float:
     """The delay of the inertial unit, s: its own, and that of a second-order Butterworth low-pass filter for slow signals."""
     low_pass = USUAL_LOW_PASS if car.low_pass is None else car.low_pass
     return _or(car.inertial_delay, UNIT_DELAY) + math.sqrt(2.0) / (2.0 * math.pi * low_pass)
@@ -30,12 +30,12 @@ def satellite_delay(car: CarSpecification) -> float:
 
 def satellite_lag(car: CarSpecification) -> float:
     """The delay of the satellites beyond that of the inertial unit, s."""
-    return max(satellite_delay(car) - unit_lag(car), 0.0)
+    return max(satellite_delay(car) - unit_delay(car), 0.0)
 
 
 def camera_lag(car: CarSpecification) -> float:
     """The delay of a camera beyond that of the inertial unit, s."""
-    return max(_or(car.camera_delay, CAMERA_DELAY) - unit_lag(car), 0.0)
+    return max(_or(car.camera_delay, CAMERA_DELAY) - unit_delay(car), 0.0)
 
 
 def _or(value: float | None, usual: float) -> float:

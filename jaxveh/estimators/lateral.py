@@ -10,7 +10,7 @@ import jax
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators.body_motion import BodyMotion, away_from_zero
 from jaxveh.estimators.car_file import number_of
-from jaxveh.estimators.delays import SHORTEST_DELAY, satellite_delay
+from jaxveh.estimators.delays import SHORTEST_DELAY, satellite_lag
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -63,4 +63,4 @@ def lateral_of(car: CarSpecification, who: str) -> Lateral:
 def motion_of(car: CarSpecification, *, wheels_first: bool = False) -> BodyMotion:
     """The cleaning that completes rows, with the car's share of driving torque and the delay of its satellites."""
     front_share = 0.5 if car.front_drive is None else car.front_drive
-    return BodyMotion(front_share, delay=max(satellite_delay(car), SHORTEST_DELAY), wheels_first=wheels_first)
+    return BodyMotion(front_share, delay=max(satellite_lag(car), SHORTEST_DELAY), wheels_first=wheels_first)

@@ -69,7 +69,7 @@ class AbstractMethod(Checked, eqx.Module):
 
     knows_places: ClassVar[bool] = False
     """Whether the method itself uses the places of the car's inertial unit and satellite antenna; otherwise it hears the
-    measurements of the centre of gravity (`at_centre.AtCentre`)."""
+    measurements of the centre of gravity (`at_centre.AtCentre`). A method around another passes on that of the inner one."""
 
     _contract = contract(needs=_needs, first=_MEMORY_AND_ANSWER, next=_MEMORY_AND_ANSWER)
 

@@ -1,4 +1,4 @@
-"""A method made from a car's file, which says where the car's inertial unit is."""
+"""A method made from a car's file, which says where the car's inertial unit and satellite antenna are."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from jaxveh._core.errors import InputError, check_kind, check_one_of, word_for
-from jaxveh.estimators.at_centre import at_centre
+from jaxveh.estimators.at_centre import method_at_centre
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.io import CarSpecification
 from jaxveh.io import kit as io
@@ -27,7 +27,7 @@ class MethodOfCar:
 
     def make(self, car: CarSpecification) -> AbstractMethod:
         """The method for a car's file, whose inertial unit and antenna may be elsewhere (`at_centre.AtCentre`)."""
-        return at_centre(self.of_centre(car), car)
+        return method_at_centre(self.of_centre(car), car)
 
 
 def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: str) -> AbstractMethod:
@@ -43,8 +43,8 @@ def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: s
         )
     entry, place = methods[name], f"{who}: METHODS[{name!r}]"
     check_kind(place, entry, MethodOfCar, "Such as MethodOfCar(lambda car: Mine(), 'what it is', 'its source').")
-    method = entry.make(source.with_front_steering())
+    method = entry.of_centre(source.with_front_steering())
     check_kind(f"{place}.make(car)", method, AbstractMethod, "Derive it from estimators.AbstractMethod.")
     if any(need.channel in TURNING for need in method.needs):
         io.check_front_steered(source, f"{who}: {name}")
-    return method
+    return method_at_centre(method, source)

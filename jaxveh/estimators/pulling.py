@@ -23,7 +23,7 @@ from jaxveh.estimators.body_motion import (
 )
 from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.delays import satellite_lag
+from jaxveh.estimators.delays import satellite_lag, unit_delay
 from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractSmoothable, answer
@@ -48,6 +48,9 @@ SATELLITES = (Need("speed", "m/s", optional=True), Need("climb_rate", "m/s", opt
 State = record_type(
     "PullingState", ("v_x", "grade", "grade_rate", "a_x_bias", "log_mass", "rolling_bias", "wheel_scale", "slip")
 )
+
+WHEELS_DELAY = 0.045
+"""s: delay of the wheels' speed, of which an inertial unit that is late, too, takes its own part."""
 
 WIDEST = math.radians(0.8)
 """rad: with a larger standard deviation, the grade counts as unknown."""
@@ -316,6 +319,7 @@ def pulling_filter(car: CarSpecification, who: str, **options: Any) -> Pulling:
         rear_compliance=compliance,
         sliding=indications_of_sliding(car),
         delay=satellite_lag(car),
+        wheel_delay=WHEELS_DELAY - unit_delay(car),
         **numbers_in(car, "wheel_inertia", "drag", "rolling_resistance", "pitch_gradient"),
         **options,
     )

@@ -26,7 +26,7 @@ SPREADS = {
 }  # fmt: skip
 """Relative standard deviations by name, on each parameter's real line (unbounded ones in units of their declared scale).
 Those of stiffness and inertia are the usual errors of car files; those of the noises are wide. That of `a_y_gain` contains a
-race car (1.01) and a soft saloon (1.12) where a file has no `roll_gradient`."""
+race car (1.01) and a soft saloon (1.15) where a file has no `roll_gradient`, and half of one that it has."""
 
 TIMING = 0.01
 """s: the standard deviation of what is left of the delay of a_y against the yaw rate, for a car of the usual size. Clocks and

@@ -246,7 +246,7 @@ def fitted_car(
         cg_height=float(fitted.cg_height),
         rear=rear,
         rear_cornering_stiffness=stiffness,
-        roll_gradient=max(float(fitted.a_y_gain) - 1.0, 0.0) / GRAVITY,
+        roll_gradient=_roll_gradient(car, fitted),
     )
     recordings = [recording] if isinstance(recording, Recording) else recording
     recordings = [with_road_steer(car, one) for one in recordings]
@@ -261,6 +261,13 @@ def fitted_car(
     if told is not None:
         told = dataclasses.replace(told, B=told.B * new.front_cornering_stiffness / (told.B * told.C * told.D), S_h=0.0)
     return dataclasses.replace(found, front=told, **new._asdict())
+
+
+def _roll_gradient(car: CarSpecification, fitted: RearAxle) -> float | None:
+    """That of the file, or else the one by which a body's accelerometer has the fitted gain. The gain contains the sensor's own
+    error of scale, so that it does not replace a known roll gradient."""
+    leans = (float(fitted.a_y_gain) - 1.0) / GRAVITY
+    return leans if car.roll_gradient is None and leans > 0.0 else car.roll_gradient
 
 
 Known = Calibration | StateSpace | CarSpecification | RearAxle

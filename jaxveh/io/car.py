@@ -37,7 +37,7 @@ rear_steer_speed = 20.0              # m/s: speed at which the ratio is halfway 
 sensor_position = [0.1, 0.0, 0.3]    # m from the centre of gravity: forward, left, up
 reference_position = [0.0, 0.0, 0.0] # m from the centre of gravity: where the reference v_y or sideslip is measured
 low_pass = 20.0                      # Hz, cutoff of the low-pass in the accelerometers and the gyroscope
-wheel_radius = 0.32                  # m; this key and the following ones are for models with four wheels
+wheel_radius = 0.32                  # m, of a rolling wheel
 wheel_inertia = 1.2                  # kg m^2, of one wheel about its axle
 drag = 0.4                           # N s^2/m^2: half the air's density times c_d times the area
 rolling_resistance = 0.01            # force over load
@@ -117,7 +117,7 @@ class CarSpecification(CarTable):
     Cornering stiffnesses are per axle, N/rad; a missing one is B C D of the axle's tyre coefficients.
     `steer_offset`: value of a steer channel at the road wheels when the car runs straight. `steering`: one of
     `car.STEERINGS`, None for front wheels; the ratios are of rear over front angle (see `vehicles.FourWheelSteering`).
-    `sensor_position`, `reference_position`: x, y, z in metres from the centre of gravity, of the accelerometer and of a
+    `sensor_position`, `reference_position`: x, y, z in metres from the centre of gravity, of the inertial unit and of a
     reference for sideslip. `antenna_position`: likewise of the satellite antenna; `satellite_delay`, `inertial_delay`,
     `camera_delay` in seconds: delays of these measurements, without that of an inertial unit's low-pass. `low_pass`: cutoff in
     hertz, of second order. `roll_gradient`, `pitch_gradient`: of the body relative to the road, per acceleration in the axes of

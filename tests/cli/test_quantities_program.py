@@ -148,8 +148,14 @@ def test_keys_that_the_car_s_file_lacks_are_told_where_they_would_be_used(drive)
     plain = dataclasses.replace(method_logs.CAR, roll_gradient=None, drag=None)
     io.write_car(plain, drive / "car.toml", overwrite=True)
     words = " ".join(estimate(drive, "--what", "friction", "--methods", "lateral_curve").output.split())
-    told = words.split("car.toml has no ")[1].split(": usual values are assumed")[0].split(", ")
+    told = words.split("car.toml has no ")[1].split(": usual values stand for them")[0].split(", ")
     assert "roll_gradient" in told and "sensor_position" in told and "drag" not in told and "mass" not in told, told
+    # A friction without satellites has no antenna; a method that is refused says why by itself.
+    assert "antenna_position" not in told
+    refused = estimate(drive, "--what", "bank,stiffness", out="third.csv").output
+    told = " ".join(refused.split()).split("car.toml has no ")[1].split(": usual")[0].split(", ")
+    assert "antenna_position" in told and "camera_delay" not in told, told
+    assert "the car's file has no roll_gradient" in " ".join(refused.split())
     words = " ".join(estimate(drive, "--what", "speed", "--methods", "fastest_wheel", out="other.csv").output.split())
     assert "usual values" not in words
 

@@ -65,7 +65,7 @@ def lateral_drive(mu, steer, forces=similar_axles, lean=True):
     _, (yaw_rate, a_y, front) = driven(forces, jnp.broadcast_to(jnp.asarray(mu, float), T.shape), jnp.asarray(steer))
     shows = 1.0 + float(PLANAR.lean) * lean
     # Inertial sensors are later than the steer by what the methods allow for.
-    late = lambda values: np.interp(T - 0.025, T, np.asarray(values))
+    late = lambda values: np.interp(T - float(PLANAR.late), T, np.asarray(values))
     return {
         "v_x": np.full(T.shape, SPEED), "steer": np.asarray(steer), "yaw_rate": late(yaw_rate), "a_y": shows * late(a_y),
         "front": late(front),

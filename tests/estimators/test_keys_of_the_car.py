@@ -3,15 +3,22 @@ of keys, so that no key is ignored in silence."""
 
 import dataclasses
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import method_logs
 import numpy as np
 import pytest
 from test_every_method import QUANTITIES, every, made
 
-from jaxveh import estimators, io
+import jaxveh
+from jaxveh import Recording, estimators, io
+from jaxveh.cli.missing_speed import wants_v_x
 from jaxveh.estimators import kit
-from jaxveh.estimators.at_centre import AtCentre, at_centre, moved_to_centre
+from jaxveh.estimators.at_centre import AtCentre, method_at_centre, moved_to_centre
 from jaxveh.estimators.catalogue import FULL_CAR
+from jaxveh.estimators.rear_axle_prior import car_of
+from jaxveh.estimators.sideslip import _roll_gradient
 
 INERTIAL, SKY, STEERED = {"a_x", "a_y"}, {"speed", "course"}, {"steer", "steering_wheel"}
 TORQUES = {"drive_torque", "brake_torque", *(f"torque_{at}" for at in method_logs.CORNERS)}
@@ -119,9 +126,9 @@ def test_every_method_that_reads_what_turns_with_the_car_hears_it_at_the_centre(
 
 
 class Hears(estimators.AbstractMethod):
-    """Answers what it hears."""
+    """Answers what it hears: the channels that are moved, and the speed along the car."""
 
-    CHANNELS = ("a_x", "a_y", "course", "speed")
+    CHANNELS = ("a_x", "a_y", "course", "speed", "v_x")
 
     @property
     def needs(self):
@@ -135,13 +142,13 @@ class Hears(estimators.AbstractMethod):
 
 
 def test_what_is_heard_is_that_of_the_centre_of_gravity_and_of_the_place_where_nothing_turns():
-    there = at_centre(Hears(), PLACES)
+    there = method_at_centre(Hears(), PLACES)
     log = method_logs.log(there.needs).replace(
         yaw_rate=method_logs.motion(method_logs.STEP * np.arange(method_logs.ROWS), 15.0)["yaw_rate"]
     )
     moved = displaced(log, PLACES)
     found = kit.follow("here", there, moved)
-    for name in Hears.CHANNELS:
+    for name in Hears.CHANNELS[:4]:
         right, ignored = np.asarray(log[name])[20:], np.asarray(moved[name])[20:]
         off = lambda one, right=right: np.sqrt(np.nanmean(np.square(one - right)))
         assert off(np.asarray(found[name])[20:]) < 0.2 * off(ignored), name
@@ -177,3 +184,119 @@ def test_a_smoothed_estimate_of_a_displaced_unit_is_that_of_the_centre():
     of = lambda car, log: np.asarray(estimators.bank.estimate(car, log, smoothed=True)["bank"])
     right, found, ignored = of(method_logs.CAR, log), of(PLACES, moved), of(method_logs.CAR, moved)
     assert np.std(found - right) <= 0.5 * np.std(ignored - right)
+
+
+def test_what_a_file_says_of_lean_and_delays_is_where_the_methods_have_it():
+    late = dataclasses.replace(FULL_CAR, inertial_delay=0.06, low_pass=8.0, satellite_delay=0.3, roll_gradient=0.012)
+    unit = 0.06 + np.sqrt(2.0) / (2.0 * np.pi * 8.0)
+    lag, lean = 0.3 - unit, 9.81 * 0.012
+    of = lambda quantity, name: QUANTITIES[quantity].METHODS[name].of_centre(late)
+    bank, friction, speed = of("bank", "filter"), of("friction", "bank").inner, of("speed", "slip_aware")
+    stiffness, navigation = of("stiffness", "weighed"), of("navigation", "rear_axle").model
+    walking, pulling = stiffness.walking, stiffness.pulling
+    expected = [
+        (friction.car.late, unit), (walking.followed.late, unit), (of("geometry", "learner").late, unit), (speed.a_x_delay, unit),
+        (navigation.system.sensor_lag, unit), (pulling.wheel_delay, 0.045 - unit),
+        (bank.delay, lag), (bank.motion.delay, lag), (pulling.delay, lag), (walking.course_delay, lag),
+        (navigation.system.lag, lag), (of("grade", "satellite").delay, lag), (speed.satellite_delay, 0.3),
+        (friction.car.lean, lean), (walking.car.lean, lean),
+        (of("sideslip", "rear_axle").inner.live.model.system.a_y_gain, 1.0 + lean),
+        (pulling.sliding.roll_gradient, 0.012), (navigation.prior.mean.lean_gradient, 0.012),
+        (navigation.system.dip_gradient, FULL_CAR.pitch_gradient),
+    ]  # fmt: skip
+    np.testing.assert_allclose(*zip(*[(float(found), value) for found, value in expected], strict=True), rtol=1e-3)
+
+
+MOVED = (("bank", "filter"), ("roll", "steady"), ("grade", "climb"), ("stiffness", "walking"))
+"""Methods of each kind that are moved: smoothed or not, with a unit, an antenna or both."""
+
+
+@pytest.mark.parametrize(("quantity", "name"), MOVED)
+def test_a_moved_method_is_live_in_float32_and_has_slopes(quantity, name):
+    method = made(quantity, name, PLACES)
+    log = method_logs.variants(method.needs)["gaps"].rows(slice(0, 90))
+    found = kit.follow(quantity, method, log)
+    live = estimators.LiveMethod(method)
+    rows = [
+        (float(log.time[k]), {n: float(log[n][k]) for n in log.names if not np.isnan(log[n][k])})
+        for k in range(len(log))
+    ]
+    memory, said = live.init(*rows[0])
+    answers = [said]
+    for row in rows[1:]:
+        memory, said = live.step(memory, *row)
+        answers.append(said)
+    for field in found.mean._fields:
+        np.testing.assert_allclose(
+            [float(getattr(one.mean, field)) for one in answers], found[field], rtol=1e-8, atol=1e-10
+        )
+    single = kit.follow(quantity, jaxveh.cast(method, jnp.float32), log)
+    assert all(leaf.dtype == np.float32 for leaf in (*single.mean, *single.std))
+    numbers, rest = eqx.partition(method, eqx.is_inexact_array)
+    values = {name: jnp.asarray(log[name]) for name in log.names}
+
+    def total(numbers, values):
+        said = kit.follow_rows(eqx.combine(numbers, rest), jnp.asarray(log.time), values)
+        return sum(jnp.sum(jnp.where(jnp.isfinite(leaf), leaf, 0.0)) for leaf in said.mean)
+
+    slopes = jax.grad(total, argnums=(0, 1))(numbers, values)
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(slopes))
+
+
+def heard(rows, car=PLACES):
+    """What is heard of rows given as channels (T,), 10 ms apart or at `time`."""
+    time = rows.pop("time", 0.01 * np.arange(len(next(iter(rows.values())))))
+    return kit.follow("here", method_at_centre(Hears(), car), Recording(time, rows))
+
+
+def test_a_car_in_reverse_a_gap_and_a_course_alone():
+    ones = np.ones(400)
+    ahead, left = PLACES.antenna_position[:2]
+    for v_x in (8.0, -3.0):
+        # The antenna's velocity on a circle with sideslip zero, in the car's axes.
+        along, across = v_x - 0.3 * left, 0.3 * ahead
+        course = np.arctan2(across, along)
+        said = heard({
+            "yaw_rate": 0.3 * ones, "course": course * ones, "speed": np.hypot(along, across) * ones, "v_x": v_x * ones,
+        })  # fmt: skip
+        right = 0.0 if v_x > 0.0 else np.pi
+        off = lambda angle, right=right: abs(float(np.angle(np.exp(1j * (float(angle) - right)))))
+        assert off(said["course"][-1]) < 0.1 * off(course)
+        assert abs(said["speed"][-1] - abs(v_x)) < 0.1
+    # A course beside a speed along the car is moved, too; one without any speed is not.
+    turning = {"yaw_rate": 0.3 * ones, "course": 0.2 * ones}
+    np.testing.assert_allclose(heard({**turning, "v_x": 10.0 * ones})["course"][-1], 0.2 - 0.03 * ahead, rtol=1e-6)
+    np.testing.assert_array_equal(heard(dict(turning))["course"], turning["course"])
+    # After a gap the yaw acceleration is not that across it.
+    time = np.concatenate([0.01 * np.arange(100), 8.0 + 0.01 * np.arange(100)])
+    turn = np.where(time < 5.0, 0.4, -0.4)
+    said = heard({"time": time, "yaw_rate": turn, "a_y": np.zeros(200)})
+    np.testing.assert_allclose(said["a_y"][100:], turn[100:] ** 2 * PLACES.sensor_position[1], atol=1e-9)
+
+
+def test_steered_rear_wheels_and_logs_without_v_x_are_judged_by_what_a_method_itself_reads():
+    rear = dataclasses.replace(PLACES, steering="rear")
+    for quantity, name in (("grade", "climb"), ("speed", "weighted")):
+        kit.method_of(quantity, QUANTITIES[quantity].METHODS, rear, name)
+    for quantity, name in (("bank", "filter"), ("stiffness", "walking")):
+        assert wants_v_x(QUANTITIES[quantity], [name], PLACES) == wants_v_x(
+            QUANTITIES[quantity], [name], method_logs.CAR
+        )
+
+
+def test_satellites_that_are_earlier_than_the_unit_keep_their_noise():
+    early = dataclasses.replace(method_logs.CAR, satellite_delay=0.0, low_pass=5.0)
+    method = made("speed", "slip_aware", early)
+    log = method_logs.log(method.needs)
+    assert np.isfinite(kit.follow("speed", method, log)["v_x"]).all()
+    memory, _ = method.first(jnp.asarray(0.0), {name: jnp.asarray(float(log[name][0])) for name in log.names})
+    variance = lambda rate: float(method._satellite(memory._replace(rate=rate), memory.belief, 15.0).variance)
+    assert variance(4.0) > variance(0.0) and variance(-4.0) > variance(0.0)
+
+
+def test_a_fitted_file_has_the_lean_of_the_fit_where_nobody_measured_it():
+    plain = dataclasses.replace(method_logs.CAR, roll_gradient=None)
+    of = lambda car, gain: _roll_gradient(car, dataclasses.replace(car_of(car), a_y_gain=jnp.asarray(gain)))
+    assert of(plain, 0.98) is None and of(plain, 1.0) is None
+    np.testing.assert_allclose(of(plain, 1.08), 0.08 / 9.81, rtol=1e-3)
+    assert of(method_logs.CAR, 1.08) == method_logs.CAR.roll_gradient

@@ -28,7 +28,7 @@ steer that comes and goes (rad), the relative increase of the measured a_y becau
 that stays (rad)."""
 
 LEAN_SPREAD = 0.059
-"""Standard deviation of the share by which the measured a_y is larger because the body leans."""
+"""Standard deviation of the share (-) by which the measured a_y is larger because the body leans."""
 
 STEER_TIME = 3.0
 """s: time constant of an error of the measured steer, most of which is the play of the steering."""

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.car_file import lean_of
-from jaxveh.estimators.delays import unit_lag
+from jaxveh.estimators.delays import unit_delay
 from jaxveh.estimators.friction import brush_curve
 from jaxveh.estimators.two_axles import AbstractAxleForces
 from jaxveh.io import CarSpecification
@@ -116,7 +116,7 @@ def planar_car(car: CarSpecification) -> PlanarCar:
         mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=car.front_axle_to_cg,
         rear_axle_to_cg=car.rear_axle_to_cg, cg_height=told(car.cg_height, 0.55), half_track=0.5 * sum(tracks) / len(tracks),
         front=curves[0], rear=curves[1], front_drive=told(car.front_drive, 0.5), front_brake=told(car.front_brake, 0.65),
-        lean=lean_of(car), late=unit_lag(car), steer_offset=told(car.steer_offset, 0.0),
+        lean=lean_of(car), late=unit_delay(car), steer_offset=told(car.steer_offset, 0.0),
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import SILENCE, STEERING, away_from_zero, hold
 from jaxveh.estimators.car_file import number_of
-from jaxveh.estimators.delays import unit_lag
+from jaxveh.estimators.delays import unit_delay
 from jaxveh.estimators.leaning import Leaning, leaning_filter
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.sequential import Belief, Measurement, belief_of, correct
@@ -281,5 +281,5 @@ def learner_of(car: CarSpecification, who: str) -> Learner:
         number_of(car, "rear_cornering_stiffness", who, "N/rad"),
         number_of(car, "steering_ratio", who, "-"),
         car.steer_offset or 0.0,
-        late=unit_lag(car),
+        late=unit_delay(car),
     )

@@ -11,6 +11,7 @@ from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import SILENCE, SLOWEST, AbstractMotionMethod, arcsin_of, hold
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.delays import SHORTEST_DELAY, satellite_lag
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.pulling import ALONG
@@ -150,4 +151,4 @@ def kinematic_of(car: CarSpecification) -> Kinematic:
 
 def satellite_of(car: CarSpecification) -> Satellite:
     """Makes `Satellite` from a car's file; without a `pitch_gradient` the body does not pitch."""
-    return Satellite(motion_of(car), car.pitch_gradient or 0.0)
+    return Satellite(motion_of(car), car.pitch_gradient or 0.0, delay=max(satellite_lag(car), SHORTEST_DELAY))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from jaxveh.estimators.delays import camera_lag, satellite_lag, unit_lag
+from jaxveh.estimators.delays import camera_lag, satellite_lag, unit_delay
 from jaxveh.estimators.navigation.method import Navigation, navigation_model
 from jaxveh.estimators.navigation.system import PLAIN, Navigator, Parts
 from jaxveh.io import AxleTyre, CarSpecification
@@ -39,7 +39,7 @@ def navigation_of(car: CarSpecification, parts: Parts = PLAIN, **numbers: Any) -
     told = {
         "lag": satellite_lag(car),
         "camera_lag": camera_lag(car),
-        "sensor_lag": unit_lag(car),
+        "sensor_lag": unit_delay(car),
         **dict(zip(("antenna_x", "antenna_y", "antenna_z"), antenna, strict=True)),
         **dict(zip(("unit_x", "unit_y"), unit[:2], strict=True)),
         "rear_axle_to_cg": car.rear_axle_to_cg,

@@ -6,7 +6,7 @@ import numpy as np
 
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.car_file import keys_of
-from jaxveh.estimators.delays import SHORTEST_DELAY, satellite_delay, unit_lag
+from jaxveh.estimators.delays import SHORTEST_DELAY, satellite_delay, unit_delay
 from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.quantity import estimate_of, live_of
 from jaxveh.estimators.speed.abs_peaks import AdaptiveNonlinear
@@ -33,7 +33,7 @@ def _brake_forces(car: CarSpecification) -> BrakeForces:
 def _slip_aware(car: CarSpecification) -> SlipAware:
     """Makes the filter with the accelerometer's gain from the file's pitch gradient, which is known to 0.3 % of the measured
     acceleration, or else with the gain of usual cars."""
-    delays = {"a_x_delay": unit_lag(car), "satellite_delay": max(satellite_delay(car), SHORTEST_DELAY)}
+    delays = {"a_x_delay": unit_delay(car), "satellite_delay": max(satellite_delay(car), SHORTEST_DELAY)}
     if car.pitch_gradient is None:
         return SlipAware(speed_car(car), **delays)
     return SlipAware(speed_car(car), Spreads(gain=0.003), GRAVITY * car.pitch_gradient, **delays)

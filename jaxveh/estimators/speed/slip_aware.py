@@ -200,7 +200,7 @@ class SlipAware(AbstractMethod):
             v_y = self._lateral(memory, x)[2]
             return numerics.hypot(x.v_x - lag * memory.rate, v_y)
 
-        spread = self.spreads.satellite + 0.3 * lag * jnp.abs(memory.rate)
+        spread = self.spreads.satellite + 0.3 * jnp.abs(lag * memory.rate)
         return innovation(belief, over_ground, value, memory.misfit.times[1] * jnp.square(spread))
 
     def _learn(self, memory: Memory, step, felt, fix, wheels):

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.car_file import lean_of
-from jaxveh.estimators.delays import unit_lag
+from jaxveh.estimators.delays import unit_delay
 from jaxveh.estimators.two_axles import (
     LATERAL,
     LONGEST,
@@ -96,4 +96,4 @@ class Followed(eqx.Module):
 
 def signals_of(car: CarSpecification, lag: float = 0.15) -> Followed:
     """The signals of a car with the inertial unit of its file."""
-    return Followed(lag, unit_lag(car))
+    return Followed(lag, unit_delay(car))
