@@ -8,13 +8,12 @@ review (Chen, Gao & Xu 2013) are in `METHODS` by name.
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Sequence
 from typing import Any, overload
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning, check_flags, check_one_of, is_concrete
+from jaxveh._core.errors import InputError, check_flags, check_one_of, is_concrete
 from jaxveh._core.parameter import pick, prior_spread
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
@@ -22,8 +21,8 @@ from jaxveh.estimators.alignment import a_y_delay, on_time
 from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning, clean
 from jaxveh.estimators.coarse_log import coarse_logs
 from jaxveh.estimators.contract import Calibration, Need, Span, check_needs, model_of, spans_of, start_of
+from jaxveh.estimators.fitted_car import fitted_car
 from jaxveh.estimators.following import follow
-from jaxveh.estimators.front_axle import front_axle
 from jaxveh.estimators.linear_baseline import do_nothing
 from jaxveh.estimators.live import Live
 from jaxveh.estimators.method import AbstractMethod, Answers, LiveMethod
@@ -43,9 +42,8 @@ from jaxveh.estimators.sideslip_score import (
 )
 from jaxveh.estimators.standing import offsets_at_standstill
 from jaxveh.filters import AbstractFilter, Estimate, Extended, SmoothedEstimate, run, smooth
-from jaxveh.io import AxleTyre, CarSpecification, with_road_steer
+from jaxveh.io import CarSpecification
 from jaxveh.statespace import Smoothing, StateSpace, kit
-from jaxveh.vehicles import GRAVITY
 
 NAME = "sideslip"
 
@@ -79,9 +77,6 @@ TARGET_WEIGHTS = (0.05, 0.02)
 
 LITTLE = 0.8
 """A parameter counts as little determined if its standard deviation is still this share of the prior's, or more."""
-
-CURVE = 1.35
-"""The Magic Formula's C in a fitted car's file."""
 
 
 def model(car: CarSpecification | RearAxle, *, a_y_delay: float | None = None) -> StateSpace:
@@ -225,49 +220,6 @@ def little_told(source: Calibration) -> tuple[str, ...]:
     return tuple(
         p.name for p, one, old in zip(chosen, left, prior, strict=True) if one > LITTLE * old and asked(p.name)
     )
-
-
-def fitted_car(
-    source: Calibration, car: CarSpecification, *, recording: Recording | Sequence[Recording] = ()
-) -> CarSpecification:
-    """The car's file with the fitted values in place, as far as a car file can hold them.
-
-    If the `recording` (or several) of the calibration is given and has `steer`, the front axle's stiffness and the steer offset
-    are fitted to it: see `front_axle`; otherwise they are the file's. **Warns** (`JaxvehWarning`) if they stay although a
-    recording is given.
-    """
-    fitted = source.model.system
-    load = float(fitted.mass) * GRAVITY * float(fitted.front_axle_to_cg) / _wheelbase(source.model)
-    stiffness, grip = float(fitted.stiffness) * load, float(fitted.grip) * load
-    rear = AxleTyre(B=stiffness / (CURVE * grip), C=CURVE, D=grip, E=0.0, nominal_load=load)
-    found = dataclasses.replace(
-        car,
-        yaw_inertia=float(fitted.yaw_inertia),
-        cg_height=float(fitted.cg_height),
-        rear=rear,
-        rear_cornering_stiffness=stiffness,
-        roll_gradient=_roll_gradient(car, fitted),
-    )
-    recordings = [recording] if isinstance(recording, Recording) else recording
-    recordings = [with_road_steer(car, one) for one in recordings]
-    steered = [one for one in recordings if is_measured(one, "steer") and is_measured(one, "a_y")]
-    told, new = car.front, front_axle(source.model, steered) if steered else None
-    if new is None:
-        why = "the front axle cannot be fitted to steer" if steered else "no log has both steer and a_y"
-        if recordings:
-            kept = f"fitted_car: {why}; the file's front axle and steer_offset are kept."
-            warnings.warn(kept, JaxvehWarning, stacklevel=2)
-        return found
-    if told is not None:
-        told = dataclasses.replace(told, B=told.B * new.front_cornering_stiffness / (told.B * told.C * told.D), S_h=0.0)
-    return dataclasses.replace(found, front=told, **new._asdict())
-
-
-def _roll_gradient(car: CarSpecification, fitted: RearAxle) -> float | None:
-    """That of the file, or else the one by which a body's accelerometer has the fitted gain. The gain contains the sensor's own
-    error of scale, so that it does not replace a known roll gradient."""
-    leans = (float(fitted.a_y_gain) - 1.0) / GRAVITY
-    return leans if car.roll_gradient is None and leans > 0.0 else car.roll_gradient
 
 
 Known = Calibration | StateSpace | CarSpecification | RearAxle

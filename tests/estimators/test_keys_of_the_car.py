@@ -17,8 +17,8 @@ from jaxveh.cli.missing_speed import wants_v_x
 from jaxveh.estimators import kit
 from jaxveh.estimators.at_centre import AtCentre, method_at_centre, moved_to_centre
 from jaxveh.estimators.catalogue import FULL_CAR
+from jaxveh.estimators.fitted_car import roll_gradient_of
 from jaxveh.estimators.rear_axle_prior import car_of
-from jaxveh.estimators.sideslip import _roll_gradient
 
 INERTIAL, SKY, STEERED = {"a_x", "a_y"}, {"speed", "course"}, {"steer", "steering_wheel"}
 TORQUES = {"drive_torque", "brake_torque", *(f"torque_{at}" for at in method_logs.CORNERS)}
@@ -296,7 +296,7 @@ def test_satellites_that_are_earlier_than_the_unit_keep_their_noise():
 
 def test_a_fitted_file_has_the_lean_of_the_fit_where_nobody_measured_it():
     plain = dataclasses.replace(method_logs.CAR, roll_gradient=None)
-    of = lambda car, gain: _roll_gradient(car, dataclasses.replace(car_of(car), a_y_gain=jnp.asarray(gain)))
+    of = lambda car, gain: roll_gradient_of(car, dataclasses.replace(car_of(car), a_y_gain=jnp.asarray(gain)))
     assert of(plain, 0.98) is None and of(plain, 1.0) is None
     np.testing.assert_allclose(of(plain, 1.08), 0.08 / 9.81, rtol=1e-3)
     assert of(method_logs.CAR, 1.08) == method_logs.CAR.roll_gradient

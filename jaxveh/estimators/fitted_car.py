@@ -1,0 +1,62 @@
+"""A car's file with what a calibration of the sideslip has fitted."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Sequence
+
+from jaxveh._core.errors import JaxvehWarning
+from jaxveh._core.recording import Recording
+from jaxveh.estimators.contract import Calibration
+from jaxveh.estimators.front_axle import front_axle
+from jaxveh.estimators.rear_axle import RearAxle
+from jaxveh.estimators.sideslip_score import is_measured
+from jaxveh.io import AxleTyre, CarSpecification, with_road_steer
+from jaxveh.vehicles import GRAVITY
+
+CURVE = 1.35
+"""The Magic Formula's C in a fitted car's file."""
+
+
+def fitted_car(
+    source: Calibration, car: CarSpecification, *, recording: Recording | Sequence[Recording] = ()
+) -> CarSpecification:
+    """The car's file with the fitted values in place, as far as a car file can hold them.
+
+    If the `recording` (or several) of the calibration is given and has `steer`, the front axle's stiffness and the steer offset
+    are fitted to it: see `front_axle`; otherwise they are the file's. **Warns** (`JaxvehWarning`) if they stay although a
+    recording is given.
+    """
+    fitted = source.model.system
+    load = float(fitted.mass) * GRAVITY * float(fitted.front_axle_to_cg) / float(fitted.wheelbase)
+    stiffness, grip = float(fitted.stiffness) * load, float(fitted.grip) * load
+    rear = AxleTyre(B=stiffness / (CURVE * grip), C=CURVE, D=grip, E=0.0, nominal_load=load)
+    found = dataclasses.replace(
+        car,
+        yaw_inertia=float(fitted.yaw_inertia),
+        cg_height=float(fitted.cg_height),
+        rear=rear,
+        rear_cornering_stiffness=stiffness,
+        roll_gradient=roll_gradient_of(car, fitted),
+    )
+    recordings = [recording] if isinstance(recording, Recording) else recording
+    recordings = [with_road_steer(car, one) for one in recordings]
+    steered = [one for one in recordings if is_measured(one, "steer") and is_measured(one, "a_y")]
+    told, new = car.front, front_axle(source.model, steered) if steered else None
+    if new is None:
+        why = "the front axle cannot be fitted to steer" if steered else "no log has both steer and a_y"
+        if recordings:
+            kept = f"fitted_car: {why}; the file's front axle and steer_offset are kept."
+            warnings.warn(kept, JaxvehWarning, stacklevel=2)
+        return found
+    if told is not None:
+        told = dataclasses.replace(told, B=told.B * new.front_cornering_stiffness / (told.B * told.C * told.D), S_h=0.0)
+    return dataclasses.replace(found, front=told, **new._asdict())
+
+
+def roll_gradient_of(car: CarSpecification, fitted: RearAxle) -> float | None:
+    """That of the file, or else the one by which a body's accelerometer has the fitted gain. The gain contains the sensor's own
+    error of scale, so that it does not replace a known roll gradient."""
+    leans = (float(fitted.a_y_gain) - 1.0) / GRAVITY
+    return leans if car.roll_gradient is None and leans > 0.0 else car.roll_gradient
