@@ -32,7 +32,7 @@ LOG = whole_log()
 @pytest.mark.parametrize(("quantity", "name"), METHODS, ids=["-".join(one) for one in METHODS])
 def test_a_method_is_stopped_by_an_error_in_each_channel_that_it_reads_and_by_no_other(quantity, name):
     module, car = QUANTITIES[quantity], estimators.kit.FULL_CAR
-    needs = {need.channel for need in module.METHODS[name].make(car).needs}
+    needs = {need.channel for need in module.METHODS[name].of_centre(car).needs}
     read = read_by(module, name, car, LOG)
     assert read == needs & set(LOG.names) and read
     for channel in (*LOG.names, "nobody's", "time"):
@@ -42,7 +42,7 @@ def test_a_method_is_stopped_by_an_error_in_each_channel_that_it_reads_and_by_no
                 check_trusted(Path("log.csv"), errors, read)
         else:
             check_trusted(Path("log.csv"), errors, read)
-    for need in module.METHODS[name].make(car).needs:
+    for need in module.METHODS[name].of_centre(car).needs:
         if need.optional and need.channel in LOG:
             empty = LOG.replace(**{need.channel: np.full(len(LOG), np.nan)})
             assert need.channel not in read_by(module, name, car, empty), need
@@ -56,7 +56,7 @@ def test_a_speed_that_the_log_lacks_is_as_good_as_what_it_is_found_from():
     )
     for quantity, name in METHODS:
         module = QUANTITIES[quantity]
-        if "v_x" in {need.channel for need in module.METHODS[name].make(car).needs}:
+        if "v_x" in {need.channel for need in module.METHODS[name].of_centre(car).needs}:
             assert {"wheel_speed_fl", "a_x"} <= read_by(module, name, car, wheels), name
             assert "speed" in read_by(module, name, car, satellites), name
 
