@@ -32,8 +32,8 @@ ALL = "all"
 FILLED = ("steer", "v_x", "a_x")
 """Channels that `--fill` fills for every quantity; for a method also those that it needs in every row."""
 
-
 SATELLITES = ("speed", "course", "climb_rate", "heading")
+"""The channels of a satellite receiver."""
 
 OF_DEVICES = {
     "antenna_position": SATELLITES,

@@ -109,7 +109,8 @@ class BodyMotion(AbstractCleaning):
 
     - `v_x_rate`, `slow_a_x` (m/s^2) and `slope` (rad): the rate of the speed and `a_x`, both through a low-pass of `slope_time`
     (s), and the body's pitch against the horizon, nose up, `(a_x - v_x_rate) / g` through the same low-pass.
-    - `late_yaw_rate` (rad/s): low-passed with half the satellites' `delay` (s) as time constant, for the mean over that delay.
+    - `late_yaw_rate` (rad/s): low-passed with half of `delay` (s), that of the satellites against the inertial unit, as time
+      constant, for the mean over that delay.
     - `dt` (s): the time since the last row; `silence`, `pull_silence` (s): the time since the last measurement of `a_y` and
       `yaw_rate`, or of `a_x`; or of the speed, if that is longer.
 

@@ -27,7 +27,7 @@ FULL_CAR = CarSpecification(
     roll_gradient=0.006, roll_frequency=1.6, roll_damping=0.3, pitch_gradient=0.004,
     front=AxleTyre(B=8.0, C=1.3, D=9000.0, E=-0.5), rear=AxleTyre(B=12.0, C=1.3, D=8300.0, E=-0.5),
 )  # fmt: skip
-"""A car's file with every key, of which one at a time is left out to find the methods that need it."""
+"""A car's file with every key, of which one at a time is left out or changed to find the methods that need or use it."""
 
 
 REAR_STEER = ("rear_steer_ratio", "rear_steer_ratio_fast", "rear_steer_speed")
@@ -36,7 +36,8 @@ REAR_STEER = ("rear_steer_ratio", "rear_steer_ratio_fast", "rear_steer_speed")
 
 def catalogue(quantities: Mapping[str, ModuleType]) -> str:
     """A Markdown table per quantity. For each method: its name (the recommended one in bold), description, source, the channels
-    that it reads (optional ones in brackets), and the optional keys of the car's file that it needs."""
+    that it reads (optional ones in brackets), and the optional keys of the car's file that it needs. A last table has the keys
+    that the recommended methods use."""
     parts = []
     for name, module in quantities.items():
         shown = ", ".join(f"`{field}` ({unit})" for field, unit in module.SHOWN.items())

@@ -12,7 +12,6 @@ SATELLITE_DELAY, CAMERA_DELAY, UNIT_DELAY = 0.15, 0.08, 0.01
 USUAL_LOW_PASS = 15.0
 """Hz: usual corner frequency of the low-pass filter in its inertial unit."""
 
-
 SHORTEST_DELAY = 1e-3
 """s: the least delay where a time is divided by it."""
 

@@ -25,7 +25,8 @@ def fitted_car(
     """The car's file with the fitted values in place, as far as a car file can hold them.
 
     If the `recording` (or several) of the calibration is given and has `steer`, the front axle's stiffness and the steer offset
-    are fitted to it: see `front_axle`; otherwise they are the file's. **Warns** (`JaxvehWarning`) if they stay although a
+    are fitted to it: see `front_axle`; otherwise they are the file's. Where the file has no `roll_gradient`, it is that of the
+    fitted gain of a_y (`roll_gradient_of`). **Warns** (`JaxvehWarning`) if they stay although a
     recording is given.
     """
     fitted = source.model.system
@@ -56,7 +57,8 @@ def fitted_car(
 
 
 def roll_gradient_of(car: CarSpecification, fitted: RearAxle) -> float | None:
-    """That of the file, or else the one by which a body's accelerometer has the fitted gain. The gain contains the sensor's own
-    error of scale, so that it does not replace a known roll gradient."""
+    """The roll gradient of the file (rad/(m/s^2)), or else the one by which a leaning body's accelerometer has the gain of the
+    `fitted` rear axle; None for a gain of at most 1. The gain contains the sensor's own error of scale, so that it does not
+    replace a known roll gradient."""
     leans = (float(fitted.a_y_gain) - 1.0) / GRAVITY
     return leans if car.roll_gradient is None and leans > 0.0 else car.roll_gradient

@@ -61,6 +61,7 @@ def lateral_of(car: CarSpecification, who: str) -> Lateral:
 
 
 def motion_of(car: CarSpecification, *, wheels_first: bool = False) -> BodyMotion:
-    """The cleaning that completes rows, with the car's share of driving torque and the delay of its satellites."""
+    """The cleaning that completes rows, with the car's share of driving torque and the delay of its satellites against its
+    inertial unit."""
     front_share = 0.5 if car.front_drive is None else car.front_drive
     return BodyMotion(front_share, delay=max(satellite_lag(car), SHORTEST_DELAY), wheels_first=wheels_first)

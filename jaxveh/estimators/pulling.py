@@ -50,7 +50,7 @@ State = record_type(
 )
 
 WHEELS_DELAY = 0.045
-"""s: delay of the wheels' speed, of which an inertial unit that is late, too, takes its own part."""
+"""s: delay of the wheels' speed. Against an inertial unit, which is late, too, it is less: `Pulling.wheel_delay`."""
 
 WIDEST = math.radians(0.8)
 """rad: with a larger standard deviation, the grade counts as unknown."""

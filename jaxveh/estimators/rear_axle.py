@@ -106,7 +106,7 @@ class RearAxle(AbstractTwoAxles):
     a_y_delay: jax.Array = parameter("s", default=0.0)
     sensor_delay: jax.Array = parameter("s", default=0.0)
     a_y_delay_error: jax.Array = parameter("s", scale=0.01, default=0.0)
-    drag: jax.Array = positive("N s^2/m^2", default=0.45)
+    drag: jax.Array = parameter("N s^2/m^2", scale=0.4, default=0.45)
     front_drive: jax.Array = parameter("-", scale=0.1, default=0.0)
     brake_share: jax.Array = parameter("-", scale=0.1, default=0.6)
     ellipse: jax.Array = positive("-", default=0.7)

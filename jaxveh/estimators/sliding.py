@@ -9,9 +9,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.parameter import positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import away_from_zero
-from jaxveh.estimators.car_file import numbers_in
+from jaxveh.estimators.car_file import USUAL_ROLL_GRADIENT, numbers_in
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 from jaxveh.vehicles import kit as vehicles
@@ -48,7 +48,7 @@ class Sliding(eqx.Module):
     Both persist for `staying` (s): wheels that grip again need a moment until their speeds are right.
     """
 
-    roll_gradient: jax.Array = positive("rad/(m/s^2)", default=0.006)
+    roll_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.006, default=USUAL_ROLL_GRADIENT)
     gathering: jax.Array = positive("s", default=1.0)
     usual_across: jax.Array = positive("m/s", default=1.0)
     learning: jax.Array = positive("s", default=10.0)

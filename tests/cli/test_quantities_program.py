@@ -150,8 +150,14 @@ def test_keys_that_the_car_s_file_lacks_are_told_where_they_would_be_used(drive)
     words = " ".join(estimate(drive, "--what", "friction", "--methods", "lateral_curve").output.split())
     told = words.split("car.toml has no ")[1].split(": usual values stand for them")[0].split(", ")
     assert "roll_gradient" in told and "sensor_position" in told and "drag" not in told and "mass" not in told, told
-    # A friction without satellites has no antenna; a method that is refused says why by itself.
-    assert "antenna_position" not in told
+    # A log without satellites asks for no antenna; a method that is refused says why by itself.
+    log = io.read_recording(drive / "drive.csv").without("speed", "course", "heading", "climb_rate")
+    io.write_recording(log, drive / "blind.csv")
+    blind = run(
+        "estimate", drive / "blind.csv", "--vehicle", drive / "car.toml", "-o", drive / "b.csv", "--what", "stiffness"
+    )
+    told = " ".join(blind.output.split()).split("car.toml has no ")[1].split(": usual")[0].split(", ")
+    assert "roll_gradient" in told and "antenna_position" not in told, told
     refused = estimate(drive, "--what", "bank,stiffness", out="third.csv").output
     told = " ".join(refused.split()).split("car.toml has no ")[1].split(": usual")[0].split(", ")
     assert "antenna_position" in told and "camera_delay" not in told, told

@@ -12,7 +12,7 @@ import pytest
 from test_every_method import QUANTITIES, every, made
 
 import jaxveh
-from jaxveh import Recording, estimators, io
+from jaxveh import InputError, Recording, estimators, io
 from jaxveh.cli.missing_speed import wants_v_x
 from jaxveh.estimators import kit
 from jaxveh.estimators.at_centre import AtCentre, method_at_centre, moved_to_centre
@@ -77,6 +77,27 @@ def test_a_key_is_used_where_it_matters_or_there_is_a_reason(quantity):
     reads = {need.channel for need in entry.make(FULL_CAR).needs}
     ignored = {key for key, channels in MATTERS.items() if channels & reads} - {*kit.keys_used(entry)}
     assert ignored == {key for name, key in EXEMPT if name == quantity}
+
+
+NEEDS_A_ROLL = {("roll_gradient", 0.0, quantity) for quantity in ("bank", "roll", "geometry")}
+"""What cannot tell roll from bank if the body does not roll."""
+
+
+def test_a_file_at_the_ends_of_its_ranges_is_taken_or_its_key_is_named():
+    refused = set()
+    for entry in dataclasses.fields(io.CarSpecification):
+        ends = [entry.metadata[end] for end in ("low", "high") if end in entry.metadata]
+        if not ends or entry.name in NO_NUMBERS or isinstance(getattr(FULL_CAR, entry.name), tuple):
+            continue
+        for end in (*ends, *((0.0,) if min(ends) < 0.0 else ())):
+            car = dataclasses.replace(FULL_CAR, **{entry.name: end})
+            for quantity, module in QUANTITIES.items():
+                try:
+                    module.METHODS[module.RECOMMENDED].make(car)
+                except InputError as error:
+                    named = entry.name if entry.name in str(error) else str(error)
+                    refused.add((named, end, quantity))
+    assert refused == NEEDS_A_ROLL
 
 
 PLACES = dataclasses.replace(method_logs.CAR, sensor_position=(1.3, 0.4, 0.0), antenna_position=(-1.5, 0.5, 0.9))
