@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from jaxveh._core.lengths import common_length
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.cleaning import without_wild_values
 from jaxveh.estimators.rear_axle import CHANNEL, INPUTS, USUAL_WHEELBASE, rolling_below
@@ -24,8 +25,8 @@ LONGEST_GAP = 0.3
 """s: rows further from a measurement are not counted."""
 
 ROWS = 128
-"""Logs are filled up with empty rows to a multiple of this, so that one compiled program serves calibrations of many
-lengths."""
+"""Logs are filled up with empty rows to a multiple of this, and long ones to a common length, so that one compiled program serves
+calibrations of many lengths."""
 
 
 def coarse_logs(recordings: Sequence[Recording], wheelbase: float) -> list[Recording]:
@@ -65,7 +66,7 @@ def coarse(recording: Recording, wheelbase: float) -> Recording:
     }  # fmt: skip
     if "v_y" in recording:
         rows["v_y"] = _reference(recording, time, step, quick)[at]
-    return _filled_up(Recording(time[at], rows), -(-len(at) // ROWS) * ROWS)
+    return _filled_up(Recording(time[at], rows), common_length(-(-len(at) // ROWS) * ROWS))
 
 
 def _even(time: np.ndarray) -> tuple[np.ndarray, float]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_flags, is_concrete
+from jaxveh._core.lengths import common_length, lengthened, lengthened_time, shortened
 from jaxveh._core.recording import Recording, time_for
 from jaxveh.estimators.contract import check_needs
 from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable, Answer, Answers, dtype_of
@@ -25,8 +26,9 @@ LITTLE = 1e3
 
 
 def follow(who: str, method: AbstractMethod, recording: Recording, *, smoothed: bool = False) -> Answers:
-    """A method's answers to all rows of a log; compiled once for each kind of method and length. Each answer looks back only;
-    with `smoothed` it uses all rows (`smooth_rows`).
+    """A method's answers to all rows of a log; compiled once for each kind of method and common length
+    (`jaxveh._core.lengths`), so that logs of similar length share a program. Each answer looks back only; with `smoothed` it
+    uses all rows (`smooth_rows`).
 
     **Raises** `InputError` for channels that are missing, in other units, infinite, or not known in every row where they must
     be, and for a method that cannot be smoothed.
@@ -41,13 +43,26 @@ def follow(who: str, method: AbstractMethod, recording: Recording, *, smoothed: 
     check_needs(who, tuple(need._replace(optional=False) for need in there), recording)
     for need in there:
         _check_finite(who, need.channel, recording)
-    dtype = dtype_of(method)
-    none = jnp.full(len(recording), jnp.nan, dtype)
-    values = {need.channel: none for need in method.needs}
-    values |= {need.channel: jnp.asarray(recording[need.channel]).astype(dtype) for need in there}
-    time = jnp.asarray(time_for(recording, dtype)).astype(dtype)
-    said = (smooth_rows if smoothed else follow_rows)(method, time, values)
+    said = _said(method, recording, [need.channel for need in there], smoothed)
     return Answers(recording.time, said.mean, said.std, said.known, said.result)
+
+
+def _said(method: AbstractMethod, recording: Recording, there: list[str], smoothed: bool) -> Answer:
+    """The answers from the channels that are `there`."""
+    dtype, rows = dtype_of(method), len(recording)
+    plain = is_concrete(method, recording)
+    # What is concrete is prepared on the host, where nothing is compiled for its length.
+    array = np.asarray if plain else jnp.asarray
+    none = np.full(rows, np.nan, dtype)
+    values = {need.channel: none for need in method.needs}
+    values |= {name: array(recording[name]).astype(dtype) for name in there}
+    time = array(time_for(recording, dtype)).astype(dtype)
+    if not plain:
+        return (smooth_rows if smoothed else follow_rows)(method, time, values)
+    length = common_length(rows)
+    time, values = lengthened_time(time, length), lengthened(values, length)
+    said = smooth_rows(method, time, values, jnp.asarray(rows)) if smoothed else follow_rows(method, time, values)
+    return shortened(said, rows)
 
 
 def _check_finite(who: str, name: str, recording: Recording) -> None:
@@ -74,21 +89,25 @@ def follow_rows(method: AbstractMethod, time: Any, values: dict[str, Any]) -> An
 
 
 @eqx.filter_jit
-def smooth_rows(method: AbstractSmoothable, time: Any, values: dict[str, Any]) -> Answer:
+def smooth_rows(method: AbstractSmoothable, time: Any, values: dict[str, Any], count: Any = None) -> Answer:
     """`follow_rows`, but each answer uses all rows: the smoother of H. Rauch, F. Tung, C. Striebel (1965), extended, with the
-    slopes at the filter's means (Sarkka 2013, sec. 9.1). What the memory holds beside the belief looks back only."""
+    slopes at the filter's means (Sarkka 2013, sec. 9.1). What the memory holds beside the belief looks back only. `count`: how
+    many of the rows, from the first on, are to be used, if not all; the answers to the others have no meaning."""
     take = lambda rows: jax.tree.map(lambda leaf: leaf[rows], (time, values))
     start, (times, rows) = take(0), take(slice(1, None))
     first, _ = apart(method.first, start[0], *start)
     turn = lambda memory: memory.belief
     if numerics.pieces_of(len(times)) == 1:
-        all_rows = numerics.Piece(times, rows, jnp.ones(len(times), bool))
+        later = len(times) if count is None else count - 1
+        all_rows = numerics.Piece(times, rows, jnp.arange(len(times)) < later)
         last, memories = _forward(method, first, all_rows)
         _, said = _backward(method, turn(last), memories, all_rows)
     else:
         ahead = lambda memory, piece: _forward(method, memory, piece)[0]
         back = lambda later, memory, piece: _backward(method, later, _forward(method, memory, piece)[1], piece)
-        last, said = numerics.there_and_back(ahead, back, first, turn, times, rows)
+        last, said = numerics.there_and_back(
+            ahead, back, first, turn, times, rows, None if count is None else count - 1
+        )
     return jax.tree.map(lambda a, b: jnp.concatenate([a, jnp.asarray(b)[None]]), said, method.say(last))
 
 

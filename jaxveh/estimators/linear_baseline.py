@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, word_for
+from jaxveh._core.lengths import common_length, lengthened, lengthened_time
 from jaxveh._core.names import record
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.contract import Need, check_needs
@@ -37,12 +38,12 @@ def open_loop(car: Any, recording: Recording) -> dict[str, np.ndarray]:
     needs more inputs than `steer`.
     """
     check_needs("open_loop", NEEDS, recording)
-    time = recording.time
-    if isinstance(time, np.ndarray):
-        # So that float32 resolves the steps of a log whose stamps count from 1970.
-        time = time - time[0]
-    found = open_loop_of(car, time, recording["steer"], recording["v_x"])
-    return {name: np.asarray(values) for name, values in found.items()}
+    time, inputs = recording.time, (recording["steer"], recording["v_x"])
+    length = common_length(len(recording))
+    # So that float32 resolves the steps of a log whose stamps count from 1970.
+    time = lengthened_time(np.asarray(time) - np.asarray(time)[0], length)
+    found = open_loop_of(car, time, *lengthened(inputs, length))
+    return {name: np.asarray(values)[: len(recording)] for name, values in found.items()}
 
 
 def _linear_car(car: Any) -> SingleTrack:

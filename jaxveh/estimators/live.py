@@ -11,7 +11,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_key, check_kind
+from jaxveh._core.errors import InputError, check_key, check_kind, is_concrete
+from jaxveh._core.lengths import common_length, lengthened, lengthened_time, shortened
 from jaxveh._core.names import as_mapping, record
 from jaxveh._core.parameter import check_parameters
 from jaxveh._core.parts import check_parts
@@ -69,8 +70,13 @@ def clean_recording(cleaning: AbstractCleaning, recording: Recording) -> Recordi
     values = {name: recording[name] for name in cleaning.channels}
     if not values:
         return recording
-    dtype = next(iter(values.values())).dtype
-    return recording.replace(**_clean_rows(cleaning, jnp.asarray(time_for(recording, dtype), dtype), values))
+    dtype, rows = next(iter(values.values())).dtype, len(recording)
+    time = time_for(recording, dtype)
+    if not is_concrete(cleaning, time, values):
+        return recording.replace(**_clean_rows(cleaning, jnp.asarray(time, dtype), values))
+    length = common_length(rows)
+    time = lengthened_time(np.asarray(time, dtype), length)
+    return recording.replace(**shortened(_clean_rows(cleaning, time, lengthened(values, length)), rows))
 
 
 @eqx.filter_jit

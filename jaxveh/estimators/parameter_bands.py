@@ -14,6 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.linalg import block_diag
 
+from jaxveh._core.errors import is_concrete
+from jaxveh._core.lengths import common_length, lengthened, lengthened_time, shortened
 from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, put, strong
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, Estimate, SmoothedEstimate, run
@@ -103,15 +105,31 @@ def estimate_with_members(
         return dataclasses.replace(centre, std=_std_of_members(filter, members, model.rows(log), centre.mean))
     model = strong(model)
     filter.check(model)
-    rows = model.rows(log)
-    found = _smoothed_with_members(filter, model, members, rows)
+    found = _of_common_length(filter, model, members, model.rows(log), len(log))
     found = dataclasses.replace(found, time=log.time, filtered=dataclasses.replace(found.filtered, time=log.time))
     kit.raise_failure(found.filtered, filter, model, log)
     return found
 
 
+def _of_common_length(
+    filter: AbstractFilter, model: StateSpace, members: Members, rows: Row, count: int
+) -> SmoothedEstimate:
+    """The smoothed rows by the program of a common length, unless something is traced."""
+    if not is_concrete(filter, model, members, rows):
+        return _smoothed_with_members(filter, model, members, rows, None)
+    length = common_length(count)
+    longer = Row(lengthened_time(rows.t, length), *lengthened((rows.u, rows.y), length))
+    found = _smoothed_with_members(filter, model, members, longer, jnp.asarray(count))
+    shorter = lambda estimate: {name: shortened(getattr(estimate, name), count) for name in estimate.by_row}
+    return dataclasses.replace(
+        found, **shorter(found), filtered=dataclasses.replace(found.filtered, **shorter(found.filtered))
+    )
+
+
 @eqx.filter_jit
-def _smoothed_with_members(filter: AbstractFilter, model: StateSpace, members: Members, rows: Row) -> SmoothedEstimate:
+def _smoothed_with_members(
+    filter: AbstractFilter, model: StateSpace, members: Members, rows: Row, count: Any
+) -> SmoothedEstimate:
     # One batch: the model's smoother alone would be another program, and take ten times as long to compile as to run.
     put_first = lambda one, many: jnp.concatenate([jnp.asarray(one, many.dtype)[None], many])
     (single, rest), several = eqx.partition(model, eqx.is_array), eqx.filter(members.models, eqx.is_array)
@@ -122,7 +140,7 @@ def _smoothed_with_members(filter: AbstractFilter, model: StateSpace, members: M
         centre, others = part(0, moments[0]), part(slice(1, None), moments)
         return centre, members.about(centre, *others)
 
-    return filters.smooth_together(filter, every, rows, joined)
+    return filters.smooth_together(filter, every, rows, joined, count)
 
 
 @eqx.filter_jit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -15,7 +15,7 @@ import numpy as np
 from jaxveh._core.errors import FilterError, InputError, JaxvehWarning
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.rear_axle import rolling_below
+from jaxveh.estimators.rear_axle import RearAxle, rolling_below
 from jaxveh.estimators.rear_axle_prior import SPREADS, STOOD, chosen_parameters
 from jaxveh.estimators.standing import Offsets
 from jaxveh.filters import AbstractFilter
@@ -143,5 +143,10 @@ def _starts(problem, model: StateSpace, in_use: float) -> list:
 
 def _forces(model: StateSpace, log: Recording) -> np.ndarray:
     """Lateral forces over load of the rear axle in the rows that are measured at speed."""
-    share = np.abs(np.asarray(eqx.filter_jit(lambda s, u: s.shares(u)[1])(model.system, model.rows(log).u)))
+    share = np.abs(np.asarray(_rear_share(model.system, model.rows(log).u)))
     return share[np.isfinite(np.asarray(log[model.channels[0]]))]
+
+
+@eqx.filter_jit
+def _rear_share(system: RearAxle, u: Any) -> Any:
+    return system.shares(u)[1]

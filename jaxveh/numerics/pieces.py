@@ -13,8 +13,8 @@ PIECE = 20_000
 
 
 class Piece(NamedTuple):
-    """A piece of `rows`, with (n, ...) leaves, their `time` (n,), and where they are `there` (n,): the last piece is filled up
-    by copies of the last row, each a step later than it."""
+    """A piece of `rows`, with (n, ...) leaves, their `time` (n,), and where they are `there` (n,): the others only fill up the
+    last piece, as copies of the last row, each a step later than it, and what was not to be counted."""
 
     time: Any
     rows: Any
@@ -33,8 +33,10 @@ def there_and_back(
     turn: Callable[[Any], Any],
     time: Any,
     rows: Any,
+    count: Any = None,
 ) -> tuple[Any, Any]:
-    """A pass forward over `rows`, (T, ...) leaves with T >= 2, at `time` (T,), and one back, in `pieces_of` them.
+    """A pass forward over `rows`, (T, ...) leaves with T >= 2, at `time` (T,), and one back, in `pieces_of` them. `count`: how
+    many of the rows, from the first on, are there, if not all.
 
     Forward, `ahead(carry, piece)` is the carry after a piece, `start` the one before the first. Back, the pieces come in reverse:
     `back(later, carry, piece)` is what the piece before needs, and what is shown of the rows of this piece, (n, ...) leaves, from
@@ -45,21 +47,22 @@ def there_and_back(
     """
     # In a gradient, too, only the first carry of a piece is kept.
     scan = lambda body, *values, **how: jax.lax.scan(jax.checkpoint(body, prevent_cse=False), *values, **how)
-    pieces = _cut(time, rows)
+    pieces = _cut(time, rows, len(time) if count is None else count)
     last, starts = scan(lambda carry, piece: (ahead(carry, piece), carry), start, pieces)
     _, shown = scan(lambda later, given: back(later, *given), turn(last), (starts, pieces), reverse=True)
     return last, jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:])[: len(time)], shown)
 
 
-def _cut(time: Any, rows: Any) -> Piece:
-    """The rows in pieces of one length: leaves (pieces, length, ...)."""
-    count, pieces = len(time), pieces_of(len(time))
-    length = -(-count // pieces)
-    there = jnp.arange(pieces * length).reshape(pieces, length) < count
+def _cut(time: Any, rows: Any, count: Any) -> Piece:
+    """The rows, of which the first `count` are there, in pieces of one length: leaves (pieces, length, ...)."""
+    given, pieces = len(time), pieces_of(len(time))
+    length = -(-given // pieces)
+    places = jnp.arange(pieces * length).reshape(pieces, length)
 
     def cut(leaf):
-        filled = jnp.concatenate([leaf, jnp.repeat(leaf[-1:], pieces * length - count, axis=0)])
+        filled = jnp.concatenate([leaf, jnp.repeat(leaf[-1:], pieces * length - given, axis=0)])
         return filled.reshape(pieces, length, *leaf.shape[1:])
 
     # A step of no length may have no slope.
-    return Piece(jnp.where(there, cut(time), 2 * time[-1] - time[-2]), jax.tree.map(cut, rows), there)
+    times = jnp.where(places < given, cut(time), 2 * time[-1] - time[-2])
+    return Piece(times, jax.tree.map(cut, rows), places < count)

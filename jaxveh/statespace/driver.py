@@ -203,9 +203,10 @@ def any_run_misses(rows: Row) -> Any:
 
 
 def scan_in_form(
-    filter: AbstractFilter, model: StateSpace, rows: Row, key, of_belief: Callable, keep: tuple[str, ...], steps: Steps
-) -> tuple[Estimate, Any]:
-    """The results of `scan_and_keep`, with steps of one kind."""
+    filter: AbstractFilter, model: StateSpace, rows: Row, key, of_belief: Callable, keep: tuple[str, ...], steps: Steps,
+    count: Any = None,
+) -> tuple[Estimate, Any]:  # fmt: skip
+    """The results of `scan_and_keep`, with steps of one kind; `count` as in `estimate_of`."""
     whole, complete = steps is Steps.whole, steps is Steps.complete
     first, rest = jax.tree.map(lambda leaf: leaf[0], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
 
@@ -222,7 +223,7 @@ def scan_in_form(
 
     belief, rest = scan_by(steps, body, belief, rest)
     shown, kept = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, rest)
-    return estimate_of(model, rows.t, shown, belief), kept
+    return estimate_of(model, rows.t, shown, belief, count), kept
 
 
 def estimate_of_row(model: StateSpace, belief: Any, info: Info, keep: tuple[str, ...]) -> tuple[Any, Any, Shown]:
@@ -232,9 +233,15 @@ def estimate_of_row(model: StateSpace, belief: Any, info: Info, keep: tuple[str,
     return info.log_likelihood, info.result, of_row
 
 
-def estimate_of(model: StateSpace, time: Any, shown: tuple[Any, Any, Shown], belief: Any) -> Estimate:
-    """The estimate from `estimate_of_row` every row, (T,) leaves, and the `belief` after the last."""
+def estimate_of(
+    model: StateSpace, time: Any, shown: tuple[Any, Any, Shown], belief: Any, count: Any = None
+) -> Estimate:
+    """The estimate from `estimate_of_row` every row, (T,) leaves, and the `belief` after the last. `count`: how many of the rows,
+    from the first on, are there, if not all: log-likelihood and result are those of these."""
     log_likelihood, results, (mean, std, info) = shown
+    if count is not None:
+        there = jnp.arange(len(time)) < count
+        log_likelihood, results = (jnp.where(there, of_row, 0) for of_row in (log_likelihood, results))
     result, failed_at = first_failure(results)
     show = lambda report: None if report is None else parameters_of(model, report)
     total = jnp.sum(log_likelihood)

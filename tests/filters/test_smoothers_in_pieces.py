@@ -68,6 +68,49 @@ def test_pieces_of_several_models_together(name, least, monkeypatch):
     same(eqx.filter_jit(in_pieces)(monkeypatch, filter_, MEMBERS, ROWS, Runs(eqx.filter_vmap, first, joined)), whole)
 
 
+def filled_up(rows):
+    """The rows and nine more, in which everything fails."""
+    longer = jax.tree.map(lambda leaf: jnp.append(leaf, jnp.full(9, leaf[-1])), rows)
+    step = rows.t[-1] - rows.t[-2]
+    at_end = slice(len(rows.t), None)
+    wild = jax.tree.map(lambda leaf: leaf.at[at_end].set(jnp.inf), longer.y)
+    return longer._replace(t=longer.t.at[at_end].add(step * jnp.arange(1.0, 10.0)), y=wild)
+
+
+def of_the_rows(found):
+    """What is of the rows that are there, and of all of them together."""
+    rows = {n: getattr(found, n) for n in ("mean", "std")} | {
+        f"f {n}": getattr(found.filtered, n) for n in ("mean", "info")
+    }
+    whole = {n: getattr(found.filtered, n) for n in ("belief", "log_likelihood", "result", "failed_at")}
+    return jax.tree.map(lambda leaf: leaf[: len(ROWS.t)], rows), whole
+
+
+@pytest.mark.product
+@pytest.mark.parametrize("pieces", [False, True])
+@pytest.mark.parametrize("name", SMOOTHED)
+def test_rows_that_only_fill_up_count_for_nothing(name, pieces, monkeypatch):
+    filter_, count = FILTERS[name].make(), jnp.asarray(len(ROWS.t))
+    smoother = kit.rauch_tung_striebel.__wrapped__
+    wanted = eqx.filter_jit(smoother)(filter_, MODEL, ROWS)
+    if pieces:
+        monkeypatch.setattr("jaxveh.numerics.pieces.PIECE", 7)
+    found = eqx.filter_jit(lambda: smoother(filter_, MODEL, filled_up(ROWS), count))()
+    same(of_the_rows(found), of_the_rows(wanted))
+
+
+@pytest.mark.product
+@pytest.mark.parametrize("least", [1, 10_000])
+@pytest.mark.parametrize("name", TOGETHER)
+def test_nor_in_several_models_together(name, least, monkeypatch):
+    monkeypatch.setattr("jaxveh.statespace.driver.WORTH", least)
+    filter_, count = FILTERS[name].make(), jnp.asarray(len(ROWS.t))
+    together = kit.smooth_together.__wrapped__
+    wanted = eqx.filter_jit(lambda: together(filter_, MEMBERS, ROWS, joined))()
+    found = eqx.filter_jit(lambda: together(filter_, MEMBERS, filled_up(ROWS), joined, count))()
+    same(of_the_rows(found), of_the_rows(wanted))
+
+
 @pytest.mark.product
 @pytest.mark.parametrize("name", SLOPES)
 def test_gradients_are_those_of_all_rows_at_once(name, monkeypatch):

@@ -29,8 +29,9 @@ class Runs(NamedTuple):
 ALONE = Runs(lambda function: function, lambda values: values, lambda moments: moments)
 
 
-def smooth_in_pieces(filter: Any, model: StateSpace, rows: Row, runs: Runs) -> SmoothedEstimate:
-    """The smoother of the `runs`, whose `model` may have an axis for them, over rows with (T,) leaves, T >= 2."""
+def smooth_in_pieces(filter: Any, model: StateSpace, rows: Row, runs: Runs, count: Any = None) -> SmoothedEstimate:
+    """The smoother of the `runs`, whose `model` may have an axis for them, over rows with (T,) leaves, T >= 2; `count` as in
+    `rauch_tung_striebel.rauch_tung_striebel`."""
     before, after = jax.tree.map(lambda leaf: leaf[0], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
 
     def begin(model):
@@ -47,11 +48,12 @@ def smooth_in_pieces(filter: Any, model: StateSpace, rows: Row, runs: Runs) -> S
 
     ahead = lambda belief, piece: runs.over(in_form(_ahead, piece))(model, belief)
     start, shown = runs.over(begin)(model)
-    last, (more, moments) = numerics.there_and_back(ahead, back, start, gaussian_of, after.t, after)
+    later = None if count is None else count - 1
+    last, (more, moments) = numerics.there_and_back(ahead, back, start, gaussian_of, after.t, after, later)
     at_end = runs.over(lambda model, belief: belief.moments(model))(model, last)
     shown = jax.tree.map(lambda one, rest: jnp.concatenate([one[None], rest]), runs.first(shown), more)
     one = runs.first(model)
-    filtered = kit.estimate_of(one, rows.t, shown, runs.first(last))
+    filtered = kit.estimate_of(one, rows.t, shown, runs.first(last), count)
     return smoothed_estimate(one, filtered, with_last(moments, runs.joined(at_end)))
 
 
@@ -60,7 +62,7 @@ def _ahead(filter: Any, model: StateSpace, rows: Row, there: Any, belief: Any, s
 
     def body(belief, given):
         row, here = given
-        return _where(here, _next(filter, model, belief, row, steps)[0], belief), None
+        return where(here, _next(filter, model, belief, row, steps)[0], belief), None
 
     return kit.scan_by(steps, body, belief, (rows, there))[0]
 
@@ -77,11 +79,11 @@ def _back(
     def ahead(belief, given):
         row, here = given
         after, info = _next(filter, model, belief, row, steps)
-        return _where(here, after, belief), (kept(belief), kit.estimate_of_row(model, after, info, kit.SHOWN))
+        return where(here, after, belief), (kept(belief), kit.estimate_of_row(model, after, info, kit.SHOWN))
 
     def back(later, given):
         belief, t, u, here = given
-        found = _where(here, given_later(filter, model, whole(belief), t, u, later), later)
+        found = where(here, given_later(filter, model, whole(belief), t, u, later), later)
         return found, found.moments(model)
 
     _, (before, shown) = kit.scan_by(steps, ahead, belief, (rows, there))
@@ -94,5 +96,6 @@ def _next(filter: Any, model: StateSpace, belief: Any, row: Row, steps: kit.Step
     return numerics.apart(filter._next, belief.count, *told) if steps is kit.Steps.whole else filter._next(*told)
 
 
-def _where(here: Any, one: Any, other: Any) -> Any:
+def where(here: Any, one: Any, other: Any) -> Any:
+    """The leaves of `one` where it is true, else those of the `other`."""
     return jax.tree.map(lambda one, other: jnp.where(here, one, other), one, other)

@@ -1,0 +1,109 @@
+"""Logs of similar length share a program: the second compiles nothing, and no number depends on what only fills up a log.
+
+The quantities are those that `estimators.__all__` lists."""
+
+import jax
+import jax.numpy as jnp
+import method_logs
+import numpy as np
+import pytest
+from test_every_method import QUANTITIES, every_quantity, made
+
+from jaxveh import Recording, estimators
+from jaxveh._core.lengths import common_length
+from jaxveh.estimators import kit
+
+SHORTER = 290
+assert common_length(SHORTER) == common_length(method_logs.ROWS) > method_logs.ROWS
+
+
+def drive(rows, needs, start=0):
+    """So many rows of the drive with the channels of `needs`."""
+    made = method_logs.channels(rows=start + rows + 3)
+    at = slice(start, start + rows)
+    return Recording(made["time"][at], {need.channel: made[need.channel][at] for need in needs})
+
+
+class Compiled:
+    """Counts the programs that are compiled."""
+
+    def __init__(self):
+        self.programs = 0
+        jax.monitoring.register_event_duration_secs_listener(self.hear)
+
+    def hear(self, event, duration, **more):
+        self.programs += event.endswith("backend_compile_duration")
+
+    def during(self, work):
+        before = self.programs
+        work()
+        return self.programs - before
+
+
+@pytest.fixture(scope="module")
+def compiled():
+    return Compiled()
+
+
+def ways_of(module):
+    """The ways in which a quantity is estimated: looking back only and, where this can be, from all rows."""
+    ways = {"live": lambda log: module.estimate(method_logs.CAR, log, method=module.RECOMMENDED)}
+    if isinstance(made(module.NAME, module.RECOMMENDED), kit.AbstractSmoothable):
+        ways["smoothed"] = lambda log: module.estimate(method_logs.CAR, log, smoothed=True)
+    return ways | {"nothing": lambda log: module.do_nothing(method_logs.CAR, log)}
+
+
+@every_quantity
+def test_a_second_log_of_similar_length_compiles_nothing(quantity, compiled):
+    module = QUANTITIES[quantity]
+    needs = made(quantity, module.RECOMMENDED).needs
+    for name, way in ways_of(module).items():
+        way(drive(method_logs.ROWS, needs))
+        assert compiled.during(lambda way=way: way(drive(SHORTER, needs, start=7))) == 0, name
+
+
+def test_neither_does_a_second_calibration_and_the_estimate_with_its_bands(compiled):
+    sideslip = estimators.sideslip
+
+    def work(rows, start):
+        log = drive(rows, sideslip.needs, start)
+        calibration = sideslip.calibrate(method_logs.CAR, log)
+        for source in (calibration, method_logs.CAR):
+            assert len(sideslip.estimate(source, log).mean.sideslip) == rows
+
+    assert compiled.during(lambda: work(method_logs.ROWS, 0)) > 2
+    assert compiled.during(lambda: work(SHORTER, 7)) == 0
+
+
+@every_quantity
+def test_the_answers_are_those_of_the_rows_alone(quantity):
+    """The same program without the rows that fill up: to the last bit looking back, smoothed to rounding. The last rows are wild,
+    so that copies of them would show."""
+    module = QUANTITIES[quantity]
+    method = made(quantity, module.RECOMMENDED)
+    log = drive(SHORTER, method.needs)
+    wild = {name: np.append(np.asarray(log[name])[:-2], np.asarray(log[name])[-2:] * 3.0 + 0.5) for name in log.names}
+    log = log.replace(**{name: wild[name] for name in wild if name not in ("v_x", "speed")})
+    values = {need.channel: jnp.asarray(log[need.channel]) for need in method.needs}
+    time = jnp.asarray(log.time)
+    for found, wanted in zip(
+        jax.tree.leaves(kit.follow(quantity, method, log)),
+        jax.tree.leaves((log.time, *kit.follow_rows(method, time, values))),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(found, wanted)
+    if isinstance(method, kit.AbstractSmoothable):
+        found, wanted = kit.follow(quantity, method, log, smoothed=True), kit.smooth_rows(method, time, values)
+        for one, other in zip(jax.tree.leaves((found.mean, found.std)), jax.tree.leaves(wanted[:2]), strict=True):
+            np.testing.assert_allclose(one, other, 1e-9, 1e-12)
+        np.testing.assert_array_equal(found.result, wanted.result)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3])
+@every_quantity
+def test_the_shortest_logs_have_answers_too(quantity, rows):
+    module = QUANTITIES[quantity]
+    method = made(quantity, module.RECOMMENDED)
+    for smoothed in {False, isinstance(method, kit.AbstractSmoothable)}:
+        said = kit.follow(quantity, method, drive(rows, method.needs), smoothed=smoothed)
+        assert all(np.shape(leaf) == (rows,) for leaf in jax.tree.leaves(said))
