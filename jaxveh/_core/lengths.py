@@ -18,7 +18,7 @@ def common_length(rows: int) -> int:
     return -(-max(rows, LEAST) // step) * step
 
 
-def lengthened(tree: Any, length: int) -> Any:
+def lengthen(tree: Any, length: int) -> Any:
     """The (T, ...) leaves of a tree, none of them traced, with copies of their last row up to a `length`; nothing is compiled."""
 
     def longer(leaf):
@@ -28,7 +28,7 @@ def lengthened(tree: Any, length: int) -> Any:
     return jax.tree.map(longer, tree)
 
 
-def lengthened_time(time: Any, length: int) -> Any:
+def lengthen_time(time: Any, length: int) -> Any:
     """The times (T,), not traced, that go on to a `length` by the last step, of one second if there is no other row."""
     known = np.asarray(time)
     step = known[-1] - known[-2] if len(known) > 1 else known.dtype.type(1.0)
@@ -36,6 +36,6 @@ def lengthened_time(time: Any, length: int) -> Any:
     return jax.device_put(np.concatenate([known, more]))
 
 
-def shortened(tree: Any, rows: int) -> Any:
+def shorten(tree: Any, rows: int) -> Any:
     """The first `rows` of the (T, ...) leaves of a tree, none of them traced; nothing is compiled."""
     return jax.tree.map(lambda leaf: jax.device_put(np.asarray(leaf)[:rows]), tree)

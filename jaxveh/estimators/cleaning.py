@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import check_kind, check_positive
-from jaxveh._core.lengths import common_length, shortened
+from jaxveh._core.lengths import common_length, shorten
 from jaxveh._core.parameter import positive
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.contract import Need, check_needs
@@ -181,7 +181,7 @@ def without_wild_values(recording: Recording, wheelbase: float) -> Recording:
     # The rows that are added have no value, and no part in the usual change.
     more = np.full(common_length(len(time)) - len(time), np.nan)
     rows = [jnp.asarray(np.append(values, more)) for values in (time - time[0], v_x, *channels)]
-    good = shortened(_good(tuple(rows), jnp.asarray(USUAL_WHEELBASE / wheelbase)), len(time))
+    good = shorten(_good(tuple(rows), jnp.asarray(USUAL_WHEELBASE / wheelbase)), len(time))
     return recording.replace(yaw_rate=np.asarray(good[0]), a_y=np.asarray(good[1]))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_flags, is_concrete
-from jaxveh._core.lengths import common_length, lengthened, lengthened_time, shortened
+from jaxveh._core.lengths import common_length, lengthen, lengthen_time, shorten
 from jaxveh._core.recording import Recording, time_for
 from jaxveh.estimators.contract import check_needs
 from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable, Answer, Answers, dtype_of
@@ -60,9 +60,9 @@ def _said(method: AbstractMethod, recording: Recording, there: list[str], smooth
     if not plain:
         return (smooth_rows if smoothed else follow_rows)(method, time, values)
     length = common_length(rows)
-    time, values = lengthened_time(time, length), lengthened(values, length)
+    time, values = lengthen_time(time, length), lengthen(values, length)
     said = smooth_rows(method, time, values, jnp.asarray(rows)) if smoothed else follow_rows(method, time, values)
-    return shortened(said, rows)
+    return shorten(said, rows)
 
 
 def _check_finite(who: str, name: str, recording: Recording) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, word_for
-from jaxveh._core.lengths import common_length, lengthened, lengthened_time
+from jaxveh._core.lengths import common_length, lengthen, lengthen_time
 from jaxveh._core.names import record
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.contract import Need, check_needs
@@ -41,8 +41,8 @@ def open_loop(car: Any, recording: Recording) -> dict[str, np.ndarray]:
     time, inputs = recording.time, (recording["steer"], recording["v_x"])
     length = common_length(len(recording))
     # So that float32 resolves the steps of a log whose stamps count from 1970.
-    time = lengthened_time(np.asarray(time) - np.asarray(time)[0], length)
-    found = open_loop_of(car, time, *lengthened(inputs, length))
+    time = lengthen_time(np.asarray(time) - np.asarray(time)[0], length)
+    found = open_loop_of(car, time, *lengthen(inputs, length))
     return {name: np.asarray(values)[: len(recording)] for name, values in found.items()}
 
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_key, check_kind, is_concrete
-from jaxveh._core.lengths import common_length, lengthened, lengthened_time, shortened
+from jaxveh._core.lengths import common_length, lengthen, lengthen_time, shorten
 from jaxveh._core.names import as_mapping, record
 from jaxveh._core.parameter import check_parameters
 from jaxveh._core.parts import check_parts
@@ -75,8 +75,8 @@ def clean_recording(cleaning: AbstractCleaning, recording: Recording) -> Recordi
     if not is_concrete(cleaning, time, values):
         return recording.replace(**_clean_rows(cleaning, jnp.asarray(time, dtype), values))
     length = common_length(rows)
-    time = lengthened_time(np.asarray(time, dtype), length)
-    return recording.replace(**shortened(_clean_rows(cleaning, time, lengthened(values, length)), rows))
+    time = lengthen_time(np.asarray(time, dtype), length)
+    return recording.replace(**shorten(_clean_rows(cleaning, time, lengthen(values, length)), rows))
 
 
 @eqx.filter_jit

@@ -15,7 +15,7 @@ import numpy as np
 from jax.scipy.linalg import block_diag
 
 from jaxveh._core.errors import is_concrete
-from jaxveh._core.lengths import common_length, lengthened, lengthened_time, shortened
+from jaxveh._core.lengths import common_length, lengthen, lengthen_time, shorten
 from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, put, strong
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, Estimate, SmoothedEstimate, run
@@ -118,9 +118,9 @@ def _of_common_length(
     if not is_concrete(filter, model, members, rows):
         return _smoothed_with_members(filter, model, members, rows, None)
     length = common_length(count)
-    longer = Row(lengthened_time(rows.t, length), *lengthened((rows.u, rows.y), length))
+    longer = Row(lengthen_time(rows.t, length), *lengthen((rows.u, rows.y), length))
     found = _smoothed_with_members(filter, model, members, longer, jnp.asarray(count))
-    shorter = lambda estimate: {name: shortened(getattr(estimate, name), count) for name in estimate.by_row}
+    shorter = lambda estimate: {name: shorten(getattr(estimate, name), count) for name in estimate.by_row}
     return dataclasses.replace(
         found, **shorter(found), filtered=dataclasses.replace(found.filtered, **shorter(found.filtered))
     )

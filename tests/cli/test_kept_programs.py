@@ -63,6 +63,11 @@ def test_a_second_start_compiles_nothing_and_after_damage_all_is_compiled_anew(o
     assert "note: a cached program from an earlier start is damaged" in said and "UserWarning" not in said
     (asked, read, written), said = simulated(tmp_path)
     assert written > 5 and "damaged" not in said
+    # As jax names its files today.
+    programs = list(folder.glob(f"*{kept_programs.PROGRAM}"))
+    assert len(programs) > 5 and (folder / kept_programs.LOCK).exists()
+    used = [program.with_name(program.name.replace("-cache", kept_programs.LAST_USE)) for program in programs]
+    assert all(len(file.read_bytes()) == 8 for file in used)
 
 
 def test_a_program_whose_last_use_was_not_written_is_damage_too(own, tmp_path):
@@ -117,6 +122,40 @@ def test_what_nobody_has_used_for_long_is_dropped(own):
         os.utime(one, (long_ago, long_ago))
     kept_programs.drop_old(own)
     assert sorted(own.iterdir()) == [other, used]
+
+
+def test_of_too_many_programs_those_used_last_stay(own, monkeypatch):
+    """The order of their last uses is not that of their names or files."""
+    monkeypatch.setattr(kept_programs, "MOST_PROGRAMS", 8)
+    monkeypatch.setattr(kept_programs, "LEFT", 3)
+    own.mkdir()
+    (own / "other").write_text("")
+
+    def keep(number, used):
+        (own / f"jit_f-{number}-cache").write_bytes(b"program")
+        (own / f"jit_f-{number}-atime").write_bytes((10**18 + used).to_bytes(8, "little"))
+
+    for number in range(8):
+        keep(number, (3 * number) % 8)
+    everything = sorted(file.name for file in own.iterdir())
+    kept_programs.drop_unused(own)
+    assert sorted(file.name for file in own.iterdir()) == everything
+    (own / "jit_f-9-cache").write_bytes(b"of a start that was killed")
+    kept_programs.drop_unused(own)
+    left = {file.name for file in own.iterdir()} - {"other", ".lockfile"}
+    # 3 k modulo 8 is 5, 6 and 7 for k = 7, 2 and 5.
+    assert left == {f"jit_f-{number}-{what}" for number in (2, 5, 7) for what in ("cache", "atime")}
+
+
+def test_while_another_start_writes_none_is_deleted(own, monkeypatch):
+    import filelock
+
+    monkeypatch.setattr(kept_programs, "MOST_PROGRAMS", 0)
+    own.mkdir()
+    (own / "jit_f-1-cache").write_bytes(b"program")
+    with filelock.FileLock(own / ".lockfile"):
+        kept_programs.drop_unused(own)
+    assert (own / "jit_f-1-cache").exists()
 
 
 def test_show_and_clear(own):

@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 
-from jaxveh._core.lengths import LEAST, common_length, lengthened, lengthened_time, shortened
+from jaxveh._core.lengths import LEAST, common_length, lengthen, lengthen_time, shorten
 
 
 def test_a_common_length_holds_the_rows_and_at_most_a_quarter_more():
@@ -25,8 +25,8 @@ def test_rows_are_added_at_the_end_and_taken_off_again_without_compiling():
     tree = {"a": rng.normal(size=37), "b": rng.normal(size=(37, 2)).astype(np.float32), "c": np.arange(37) > 20}
     time = np.linspace(1.7e6, 1.7e6 + 3.6, 37)
     jax.monitoring.register_event_duration_secs_listener(count)
-    longer, times, alone = lengthened(tree, 48), lengthened_time(time, 48), lengthened_time(time[:1], 4)
-    again = shortened(longer, 37)
+    longer, times, alone = lengthen(tree, 48), lengthen_time(time, 48), lengthen_time(time[:1], 4)
+    again = shorten(longer, 37)
     assert not compiled
     for name, values in tree.items():
         np.testing.assert_array_equal(again[name], values)

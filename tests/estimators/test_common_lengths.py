@@ -11,7 +11,7 @@ from test_every_method import QUANTITIES, every_quantity, made
 
 from jaxveh import Recording, estimators
 from jaxveh._core.lengths import common_length
-from jaxveh.estimators import kit
+from jaxveh.estimators import cleaning, kit
 
 SHORTER = 290
 assert common_length(SHORTER) == common_length(method_logs.ROWS) > method_logs.ROWS
@@ -97,6 +97,21 @@ def test_the_answers_are_those_of_the_rows_alone(quantity):
         for one, other in zip(jax.tree.leaves((found.mean, found.std)), jax.tree.leaves(wanted[:2]), strict=True):
             np.testing.assert_allclose(one, other, 1e-9, 1e-12)
         np.testing.assert_array_equal(found.result, wanted.result)
+
+
+def test_wild_values_are_those_of_the_rows_alone():
+    """The usual change of a channel decides what is wild: here that of a log whose channels stay the same at its end."""
+    rng = np.random.default_rng(4)
+    log = drive(SHORTER, estimators.sideslip.needs)
+    rough = np.asarray(log["a_y"]) + 4.0 * rng.normal(size=SHORTER)
+    log = log.replace(a_y=np.where(np.arange(SHORTER) > SHORTER // 2, 1.0, rough))
+    names = ("v_x", "yaw_rate", "a_y")
+    rows = tuple(jnp.asarray(one) for one in (np.asarray(log.time) - log.time[0], *[np.asarray(log[n]) for n in names]))
+    wanted = cleaning._good(rows, jnp.asarray(cleaning.USUAL_WHEELBASE / 2.7))
+    found = cleaning.without_wild_values(log, 2.7)
+    assert 3 < np.isnan(wanted[1][: SHORTER // 2]).sum() < SHORTER // 2
+    for name, values in zip(names[1:], wanted, strict=True):
+        np.testing.assert_array_equal(found[name], values)
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3])
