@@ -100,8 +100,8 @@ def test_the_answers_are_those_of_the_rows_alone(quantity):
 
 
 def test_wild_values_are_those_of_the_rows_alone():
-    """The median change of a channel decides what is wild at first: here a_y stays the same in a little less than half of the rows,
-    and jumps in the others as a sound one would not."""
+    """The median change of a channel decides what is wild at first: here a_y stays the same in a little less than half of its
+    rows, and jumps in the others as a sound one would not."""
     rng = np.random.default_rng(4)
     log = drive(SHORTER, estimators.sideslip.needs)
     rough = np.asarray(log["a_y"]) + 4.0 * rng.normal(size=SHORTER)
