@@ -32,7 +32,7 @@ from jaxveh.fitting.result import AbstractFit
 from jaxveh.fitting.rig_data import RigData, Settings, StageReport, fold_of, rms
 from jaxveh.fitting.rig_identify import settle, without
 from jaxveh.fitting.rig_in_turn import fit_in_turn
-from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, offered_forces, spread_of
+from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, of_common_length, offered_forces, spread_of
 from jaxveh.fitting.rig_robust import inflation
 from jaxveh.fitting.rig_stages import HELD_COEFFICIENTS, Stage, stages_of
 from jaxveh.fitting.solve import fit_at
@@ -295,7 +295,7 @@ def _names(law: AbstractTyre, plan: list[Stage], chosen: tuple[str, ...] | None)
 def _result(data: RigData, law, joint: Stage, held: np.ndarray, reports, start_rmse, validation) -> RigFit:
     noise, last = data.noise(law), reports[-1]
     problem = _as_uncertain(data.problem(law, joint, noise), held, joint.coefficients)
-    fit, known = _summary(problem, jnp.asarray(last.steps), jnp.asarray(last.converged))
+    fit, known = _summary(of_common_length(problem), jnp.asarray(last.steps), jnp.asarray(last.converged))
     # The noise is that of the fit, corrected for the degrees of freedom of the coefficients.
     count = int(data.present.sum())
     factor = count / (count - int((~held).sum()))

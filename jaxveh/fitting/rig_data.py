@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -15,7 +16,18 @@ from jaxveh._core.bijectors import Interval
 from jaxveh._core.errors import InputError, check_at_least, check_positive
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, resolve
-from jaxveh.fitting.rig_problem import PULL, Descent, RigProblem, contact_of, descend, forces_of, start_of
+from jaxveh.fitting.rig_problem import (
+    PULL,
+    Descent,
+    RigProblem,
+    contact_of,
+    descend,
+    fill_up,
+    forces_of,
+    of_common_length,
+    rows_of_common_length,
+    start_of,
+)
 from jaxveh.fitting.rig_robust import TO_DEVIATION
 from jaxveh.fitting.rig_stages import Stage
 from jaxveh.io import RigTable
@@ -141,8 +153,8 @@ class RigData:
         return RigProblem(
             law=law,
             contact=self.contact,
-            measured=jnp.asarray(self.measured),
-            weight=jnp.asarray(counts * np.array(size)[:, None]),
+            measured=jax.device_put(self.measured),
+            weight=jax.device_put(counts * np.array(size)[:, None]),
             emphasis=jnp.asarray(emphasis),
             origin=origin,
             scale=jnp.where(moves, scale, 0.0),
@@ -156,7 +168,8 @@ class RigData:
 
     def residuals(self, law: AbstractTyre) -> np.ndarray:
         """Fitted less measured (m, n), nan without a measurement."""
-        found = np.asarray(_forces(law, self.contact, self.channels, jnp.asarray(self.measured)))
+        contact, measured = rows_of_common_length(self.contact, self.measured)
+        found = np.asarray(_forces(law, contact, self.channels, measured))[:, : self.measured.shape[1]]
         return np.where(self.present, found - self.measured, np.nan)
 
     def rmse(self, law: AbstractTyre) -> dict[str, float]:
@@ -181,8 +194,9 @@ class RigData:
 
     def loss(self, law: AbstractTyre, stage: Stage, noise: Mapping[str, float]) -> float:
         """The minimised loss of the stage, comparable between laws for the same noise; infinite where a force is not finite."""
-        problem = self.problem(law, stage, noise)
-        bent = problem.bend(problem.weight * jnp.asarray(np.where(self.counts(stage), self.residuals(law), 0.0)))[0]
+        problem = of_common_length(self.problem(law, stage, noise))
+        rows = fill_up(np.where(self.counts(stage), self.residuals(law), 0.0), problem.weight.shape[1], "constant")
+        bent = problem.bend(problem.weight * rows)[0]
         return float(np.nan_to_num(jnp.sum(problem.emphasis[:, None] * bent**2), nan=np.inf))
 
     def counts(self, stage: Stage) -> np.ndarray:
@@ -214,7 +228,7 @@ class RigData:
         steps, alone = 0, not self.chosen.robust and len(stage.channels) == 1
         while steps < most:
             problem, limit = self.problem(law, stage, self.noise(law)), min(ROUND, most - steps)
-            found, lowered = _descend(problem, jnp.asarray(limit), self.chosen.tolerance)
+            found, lowered = _descend(of_common_length(problem), jnp.asarray(limit), self.chosen.tolerance)
             law, steps = problem.model_at(found.z), steps + int(found.steps)
             if 2 * float(lowered) < SETTLED or (alone and bool(found.converged)):
                 return law, steps, True

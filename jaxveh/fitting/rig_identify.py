@@ -14,7 +14,7 @@ import numpy as np
 
 from jaxveh.fitting.rig_canonical import canonical
 from jaxveh.fitting.rig_data import RigData, StageReport, leaf_of, with_leaf
-from jaxveh.fitting.rig_problem import spread_at_start, start_of
+from jaxveh.fitting.rig_problem import of_common_length, spread_at_start, start_of
 from jaxveh.fitting.rig_stages import Stage
 from jaxveh.tyres import AbstractTyre, MFTyre
 
@@ -111,7 +111,7 @@ def _unidentified_coefficients(
     """
     free = without(joint, held, joint.coefficients)
     problem = data.problem(tyre, free, data.noise(tyre))
-    spread = np.array(spread_at_start(problem))
+    spread = np.array(spread_at_start(of_common_length(problem)))
     scale = np.asarray(start_of(tyre, data.parameters(tyre))[1])
     away = np.asarray(problem.origin - start_of(start, data.parameters(start))[0]) / scale
     open_ = ~held & ~kept

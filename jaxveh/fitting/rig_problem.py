@@ -14,6 +14,7 @@ import optimistix as optx
 from jax import lax
 
 from jaxveh._core.bijectors import Real
+from jaxveh._core.lengths import common_length
 from jaxveh._core.parameter import Parameter, pick, put
 from jaxveh.fitting.levenberg_marquardt import LevenbergMarquardt, Quadratic
 from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units
@@ -31,6 +32,9 @@ freedom."""
 
 BLOCK = 2000
 """Rows per block on a CPU; an accelerator takes all at once."""
+
+SHARED = 10_000
+"""Rows of the longest table that is filled up to a common length: to fit a longer one takes longer than to compile."""
 
 
 def forces_of(law: AbstractTyre, contact: Contact, channels: tuple[str, ...], measured: jax.Array) -> jax.Array:
@@ -234,23 +238,46 @@ def _in_blocks(problem: RigProblem) -> tuple[Any, Callable[[Any], RigProblem]]:
     return (jax.tree.map(cut, by_row), cut(problem.measured), cut(problem.weight, "constant")), block
 
 
+def of_common_length(problem: RigProblem) -> RigProblem:
+    """The problem filled up with copies of its last row, without weight, so that tables of similar length share a program; not
+    traced."""
+    contact, measured = rows_of_common_length(problem.contact, problem.measured)
+    weight = fill_up(problem.weight, measured.shape[1], "constant")
+    return dataclasses.replace(problem, contact=contact, measured=measured, weight=weight)
+
+
+def rows_of_common_length(contact: Contact, measured: Any) -> tuple[Contact, Any]:
+    """The contact and the measurements (m, n), with copies of the last row up to a common length."""
+    rows = measured.shape[1]
+    length = common_length(rows) if rows <= SHARED else rows
+    longer = lambda leaf: fill_up(leaf, length, "edge") if jnp.shape(leaf) == (rows,) else leaf
+    return jax.tree.map(longer, contact), fill_up(measured, length, "edge")
+
+
+def fill_up(leaf: Any, length: int, mode: Any) -> Any:
+    """Numbers by row (..., n) up to a length: by the last row's ("edge"), or by zeros ("constant")."""
+    values = np.asarray(leaf)
+    more = length - values.shape[-1]
+    return jax.device_put(np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, more)], mode=mode))
+
+
 def contact_of(rig) -> Contact:
     """The contact of each row of a `RigTable`."""
-    optional = lambda values: None if values is None else jnp.asarray(values)
+    array = lambda values: None if values is None else jax.device_put(np.asarray(values))
     return Contact(
-        slip_angle=jnp.asarray(rig.slip_angle),
-        slip_ratio=jnp.asarray(rig.slip_ratio),
-        load=jnp.asarray(rig.load),
-        camber=0.0 if rig.camber is None else jnp.asarray(rig.camber),
+        slip_angle=array(rig.slip_angle),
+        slip_ratio=array(rig.slip_ratio),
+        load=array(rig.load),
+        camber=0.0 if rig.camber is None else array(rig.camber),
         # Rigs that do not record the speed write zero throughout.
-        speed=None if rig.speed is None or not np.any(rig.speed) else jnp.asarray(rig.speed),
-        pressure=optional(rig.pressure),
+        speed=None if rig.speed is None or not np.any(rig.speed) else array(rig.speed),
+        pressure=array(rig.pressure),
     )
 
 
 def offered_forces(law: AbstractTyre, contact: Contact) -> tuple[str, ...]:
     """The forces and moments that a law computes (those that are not a plain zero)."""
-    one = jax.tree.map(lambda values: values[:1] if jnp.ndim(values) else values, contact)
+    one = jax.tree.map(lambda values: np.asarray(values)[:1] if jnp.ndim(values) else values, contact)
     found = eqx.filter_eval_shape(law.forces, one)
     return tuple(name for name, value in found._asdict().items() if not isinstance(value, float))
 
