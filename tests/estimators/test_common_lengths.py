@@ -71,7 +71,7 @@ def test_neither_does_a_second_calibration_and_the_estimate_with_its_bands(compi
         for source in (calibration, method_logs.CAR):
             assert len(sideslip.estimate(source, log).mean.sideslip) == rows
 
-    assert compiled.during(lambda: work(method_logs.ROWS, 0)) > 2
+    work(method_logs.ROWS, 0)
     assert compiled.during(lambda: work(SHORTER, 7)) == 0
 
 

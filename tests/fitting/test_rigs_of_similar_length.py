@@ -31,13 +31,11 @@ def test_a_second_table_compiles_nothing():
     )
     jax.monitoring.register_event_duration_secs_listener(hear)
     assert common_length(ROWS) == common_length(ROWS - 9)
-    fits = []
     for rows, seed in ((ROWS, 1), (ROWS - 9, 2)):
         before, data = len(programs), rig(rows, seed)
         fit = fitting.fit_rig(fitting.starting_tyre("brush", data), data, folds=2)
-        fits.append(len(programs) - before)
         assert fit.problem.units() == rows and fit.residuals["F_x"].shape == (rows,)
-    assert fits[0] > 3 and fits[1] == 0
+    assert len(programs) == before
 
 
 @pytest.mark.parametrize(("name", "robust"), [*((name, False) for name in RIG_STARTS), ("brush", True)])
