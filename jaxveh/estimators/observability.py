@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from jaxveh._core.errors import InputError, check_flags, check_kind
+from jaxveh._core.errors import InputError, check_flags, check_kind, is_concrete
+from jaxveh._core.lengths import common_length, lengthen, lengthen_time
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Observability, observability_at
 from jaxveh.statespace import Row, StateSpace, kit
@@ -47,18 +50,37 @@ def observe(model: StateSpace, recording: Recording, known_start: bool = True) -
     kit.check_model("observe", model)
     if model.chosen is None:
         raise InputError("observability: the model estimates no parameter; give `estimate=` or `with_parameters`.")
-    rows, n = model.rows(recording), len(model.chosen.states)
+    rows, n = _of_common_length(model.rows(recording)), len(model.chosen.states)
     mean, spread = jnp.stack(model.prior.mean), jnp.sqrt(jnp.diagonal(model.prior.covariance()))
     order = jnp.concatenate([jnp.arange(n, mean.size), jnp.arange(n)])
-    used = mean.size if not known_start else mean.size - n
-
-    @jax.jit
-    def predict(z):
-        full = mean.at[order[:used]].set(z)
-        predicted, present = predict_measurements(model, rows, type(model.prior.mean)(*full))
-        white = kit.whiten(model.measurement_noise, predicted, present)
-        return jnp.concatenate([white[name] for name in model.channels])
-
+    used = order[: mean.size if not known_start else mean.size - n]
+    predict = eqx.filter_jit(Predicted(model, rows, mean, used))
     names = tuple(p.name for p in model.chosen.parameters)
-    at, spread = mean[order[:used]], spread[order[:used]]
-    return observability_at(predict, at, names, spread, nuisance=0 if known_start else n)
+    return observability_at(predict, mean[used], names, spread[used], nuisance=0 if known_start else n)
+
+
+def _of_common_length(rows: Row) -> Row:
+    """The rows, filled up with rows of which nothing is measured, so that drives of similar length share a program."""
+    if not is_concrete(rows):
+        return rows
+    count = len(rows.t)
+    length = common_length(count)
+    unmeasured = jax.tree.map(lambda y: np.append(y, np.full(length - count, np.nan, y.dtype)), rows.y)
+    return Row(lengthen_time(rows.t, length), lengthen(rows.u, length), lengthen(unmeasured, length))
+
+
+class Predicted(eqx.Module):
+    """The measurements over their noise, of all channels one after the other, as a function of the start's `used` entries, numbers
+    on the real line; the others are those of the `mean`. It is a tree of arrays, so that drives of one length share a program, and
+    rows that are not measured have no part in it."""
+
+    model: StateSpace
+    rows: Row
+    mean: jax.Array
+    used: jax.Array
+
+    def __call__(self, z):
+        full = self.mean.at[self.used].set(z)
+        predicted, present = predict_measurements(self.model, self.rows, type(self.model.prior.mean)(*full))
+        white = kit.whiten(self.model.measurement_noise, predicted, present)
+        return jnp.concatenate([white[name] for name in self.model.channels])

@@ -135,3 +135,38 @@ def test_a_model_without_parameters_is_refused():
     with pytest.raises(InputError, match="the model estimates no parameter"):
         observe(plain, Recording(TIME, {"x": TIME}))
     assert jax.tree.leaves(plain)
+
+
+def _explosion():
+    """dx/dt = slope x^2, which has no bound shortly after `TIME`."""
+    plain = ss.StateSpace(
+        system={"slope": jnp.asarray(0.4)},
+        transition=lambda s, t0, t1, x, u: Line(x.x + s["slope"] * (t1 - t0) * x.x**2),
+        observation=lambda s, t, x, u: ss.model.record("Y", {"y": x.x}),
+        process_noise=None,
+        measurement_noise=ss.Gaussian({"y": 0.1}),
+        prior=ss.Prior(Line(1.0), {"x": 0.05}),
+    )
+    return ss.with_parameters(plain, lambda m: m.system["slope"], prior=0.25)
+
+
+def test_drives_of_similar_length_share_a_program_and_what_comes_after_them_has_no_part():
+    programs, model = [], _explosion()
+    hear = lambda event, duration, **more: (
+        programs.append(event) if event.endswith("backend_compile_duration") else None
+    )
+    jax.monitoring.register_event_duration_secs_listener(hear)
+    for rows in (21, 17):
+        before = len(programs)
+        found = observe(model, Recording(TIME[:rows], {"y": MEASURED[:rows]}))
+
+        def path(slope, rows=rows):
+            x = [1.0]
+            for dt in np.diff(TIME[:rows]):
+                x.append(x[-1] + slope * dt * x[-1] ** 2)
+            return np.array(x)
+
+        slopes = (path(0.4 + 1e-6) - path(0.4 - 1e-6)) / 2e-6
+        information = np.nansum(np.where(np.isnan(MEASURED[:rows]), np.nan, slopes / 0.1) ** 2)
+        np.testing.assert_allclose(found.bounds.array(), information**-0.5, rtol=1e-7)
+    assert len(programs) == before
