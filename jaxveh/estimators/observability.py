@@ -71,8 +71,8 @@ def _of_common_length(rows: Row) -> Row:
 
 class Predicted(eqx.Module):
     """The measurements over their noise, of all channels one after the other, as a function of the start's `used` entries (on the
-    real line); the others are those of the `mean`. It is a tree of arrays, so that drives of one length share a program. Rows that
-    are not measured have no part in it."""
+    real line); the others are those of the `mean`. It is a tree of arrays, so that drives of one length share a program. Rows
+    that are not measured have no part in it."""
 
     model: StateSpace
     rows: Row

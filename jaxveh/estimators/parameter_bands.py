@@ -14,11 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.linalg import block_diag
 
-from jaxveh._core.errors import is_concrete
-from jaxveh._core.lengths import common_length, lengthen, lengthen_time, shorten
 from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, put, strong
 from jaxveh._core.recording import Recording
-from jaxveh.filters import AbstractFilter, Estimate, SmoothedEstimate, run
+from jaxveh.filters import AbstractFilter, Estimate, SmoothedEstimate
 from jaxveh.filters import kit as filters
 from jaxveh.fitting import Fit
 from jaxveh.fitting import kit as fitting
@@ -101,29 +99,14 @@ def estimate_with_members(
 ) -> Estimate | SmoothedEstimate:
     """The estimate of a model, from all rows or from those up to each, with standard deviations that include its `members`."""
     if not smoothed:
-        centre = run(filter, model, log)
-        return dataclasses.replace(centre, std=_std_of_members(filter, members, model.rows(log), centre.mean))
+        scan = lambda model, rows: kit.of_common_length(_followed_with_members, rows, filter, model, members)
+        return kit.run_by(scan, filter, model, log)
     model = strong(model)
     filter.check(model)
-    found = _of_common_length(filter, model, members, model.rows(log), len(log))
+    found = kit.of_common_length(_smoothed_with_members, model.rows(log), filter, model, members)
     found = dataclasses.replace(found, time=log.time, filtered=dataclasses.replace(found.filtered, time=log.time))
     kit.raise_failure(found.filtered, filter, model, log)
     return found
-
-
-def _of_common_length(
-    filter: AbstractFilter, model: StateSpace, members: Members, rows: Row, count: int
-) -> SmoothedEstimate:
-    """The smoothed rows by the program of a common length, unless something is traced."""
-    if not is_concrete(filter, model, members, rows):
-        return _smoothed_with_members(filter, model, members, rows, None)
-    length = common_length(count)
-    longer = Row(lengthen_time(rows.t, length), *lengthen((rows.u, rows.y), length))
-    found = _smoothed_with_members(filter, model, members, longer, jnp.asarray(count))
-    shorter = lambda estimate: {name: shorten(getattr(estimate, name), count) for name in estimate.by_row}
-    return dataclasses.replace(
-        found, **shorter(found), filtered=dataclasses.replace(found.filtered, **shorter(found.filtered))
-    )
 
 
 @eqx.filter_jit
@@ -144,6 +127,15 @@ def _smoothed_with_members(
 
 
 @eqx.filter_jit
+def _followed_with_members(
+    filter: AbstractFilter, model: StateSpace, members: Members, rows: Row, count: Any
+) -> Estimate:
+    form = kit.scan_in_form(filter, model, rows, None, lambda belief: belief, kit.SHOWN, kit.Steps.whole, count)
+    (found, beliefs), last = form, -1 if count is None else count - 1
+    std = _std_of_members(filter, members, rows, found.mean)
+    return dataclasses.replace(found, std=std, belief=jax.tree.map(lambda leaf: leaf[last], beliefs))
+
+
 def _std_of_members(filter: AbstractFilter, members: Members, rows: Row, centre: Any) -> Any:
     """The standard deviations about the means `centre` of a filter."""
     moments = eqx.filter_vmap(lambda model, belief: belief.moments(model))

@@ -102,6 +102,19 @@ def run(
     filter failed. **Warns** (`JaxvehWarning`) if it went on but has remarks on rows (`info.remark`), and if rows are too far
     apart for the steps between them. `throw=False`: no `FilterError` and no warning.
     """
+    return run_by(
+        lambda model, rows: _compiled_scan(filter, model, rows, key, as_names(keep)), filter, model, recording, throw
+    )
+
+
+def run_by(
+    scan: Callable[[StateSpace, Row], Estimate],
+    filter: AbstractFilter,
+    model: StateSpace,
+    recording: Recording,
+    throw: bool = True,
+) -> Estimate:
+    """The estimate that `scan(model, rows)` makes of the recording's rows, with the checks, errors and warnings of `run`."""
     check_flags(throw=throw)
     model = strong(model)
     check_told(filter, model)
@@ -109,8 +122,7 @@ def run(
     note_function("run: transition", model.transition_function)
     note_function("run: observation", model.observation_function)
     rows = model.rows(recording)
-    estimate = _compiled_scan(filter, model, rows, key, as_names(keep))
-    estimate = dataclasses.replace(estimate, time=recording.time)
+    estimate = dataclasses.replace(scan(model, rows), time=recording.time)
     if throw:
         warn_of_far_rows(model, rows)
         raise_failure(estimate, filter, model, recording)

@@ -11,6 +11,7 @@ from jaxveh.statespace.capabilities import (
     smoothing_of,
     who_lacks,
 )
+from jaxveh.statespace.common_length import of_common_length
 from jaxveh.statespace.contract import KEPT, check_model, check_told, innermost, key_for, layers
 from jaxveh.statespace.dependent_noise import check_fixed
 from jaxveh.statespace.disturbances import DISTURBANCE_PREFIX
@@ -23,6 +24,7 @@ from jaxveh.statespace.driver import (
     estimate_of_row,
     in_form_for_batches,
     raise_failure,
+    run_by,
     scan_and_keep,
     scan_by,
     scan_in_form,
@@ -62,9 +64,11 @@ __all__ = [
     "key_for",
     "layers",
     "likelihood_result",
+    "of_common_length",
     "presence",
     "raise_failure",
     "result_of_parts",
+    "run_by",
     "scalar_row",
     "scan_and_keep",
     "scan_by",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_every_method import QUANTITIES, every_quantity, made
 
-from jaxveh import Recording, estimators
+from jaxveh import Recording, estimators, filters
 from jaxveh._core.lengths import common_length
 from jaxveh.estimators import cleaning, kit
 
@@ -68,8 +68,10 @@ def test_neither_does_a_second_calibration_and_the_estimate_with_its_bands(compi
     def work(rows, start):
         log = drive(rows, sideslip.needs, start)
         calibration = sideslip.calibrate(method_logs.CAR, log)
-        for source in (calibration, method_logs.CAR):
-            assert len(sideslip.estimate(source, log).mean.sideslip) == rows
+        sources = (calibration, method_logs.CAR, sideslip.model(method_logs.CAR))
+        found = [sideslip.estimate(source, log) for source in sources]
+        found += [sideslip.estimate(method_logs.CAR, log, smoothed=False)]
+        assert all(len(estimate.mean.sideslip) == rows for estimate in found)
 
     work(method_logs.ROWS, 0)
     assert compiled.during(lambda: work(SHORTER, 7)) == 0
@@ -97,6 +99,19 @@ def test_the_answers_are_those_of_the_rows_alone(quantity):
         for one, other in zip(jax.tree.leaves((found.mean, found.std)), jax.tree.leaves(wanted[:2]), strict=True):
             np.testing.assert_allclose(one, other, 1e-9, 1e-12)
         np.testing.assert_array_equal(found.result, wanted.result)
+
+
+def test_an_estimate_without_smoothing_is_that_of_the_filter():
+    """Its means, its likelihood and the belief after the last row, to the last bit."""
+    sideslip = estimators.sideslip
+    log, model = drive(SHORTER, sideslip.needs), sideslip.model(method_logs.CAR)
+    wanted = filters.run(filters.Extended(), model, cleaning.clean(log, cleaning.RearAxleCleaning(2.7)))
+    found = sideslip.estimate(method_logs.CAR, log, smoothed=False)
+    for name in ("time", "mean", "info", "log_likelihood", "result", "failed_at", "belief"):
+        one, other = (jax.tree.leaves(getattr(estimate, name)) for estimate in (found, wanted))
+        assert len(one) == len(other) > 0, name
+        for a, b in zip(one, other, strict=True):
+            np.testing.assert_array_equal(a, b, err_msg=name)
 
 
 def test_wild_values_are_those_of_the_rows_alone():

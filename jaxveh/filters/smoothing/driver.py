@@ -58,7 +58,7 @@ def smooth(
             f"method = {word_for(method)}: is for particle filters; {type(filter).__name__} has a smoother of its own."
         )
     else:
-        found = rauch_tung_striebel(filter, model, rows)
+        found = kit.of_common_length(rauch_tung_striebel, rows, filter, model)
     found = eqx.tree_at(lambda e: (e.time, e.filtered.time), found, (recording.time, recording.time))
     if throw:
         kit.raise_failure(found.filtered, filter, model, recording)
