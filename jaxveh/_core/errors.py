@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,18 @@ class FilterError(RuntimeError):
 
 class JaxvehWarning(UserWarning):
     """Something is unusual but not wrong."""
+
+
+INSIDE = ("jaxveh", "jax", "equinox", "optimistix", "diffrax")
+"""Packages in which nobody looks for the reason of a warning."""
+
+
+def warn(message: str) -> None:
+    """Warn of something unusual (`JaxvehWarning`), at the line of the caller's own code."""
+    frame, level = inspect.currentframe(), 1
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in INSIDE:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, JaxvehWarning, stacklevel=level)
 
 
 def is_concrete(*values) -> bool:

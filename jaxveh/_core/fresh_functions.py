@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import types
-import warnings
 import weakref
 from typing import Any
 
-from jaxveh._core.errors import JaxvehWarning
+from jaxveh._core.errors import warn
 
 TURNS = 5
 """This many functions from one place in the source are taken for a loop."""
@@ -24,10 +23,8 @@ def note_function(who: str, function: Any) -> None:
     code = function.__code__
     _counts[code] = _counts.get(code, 0) + 1
     if _counts[code] == TURNS:
-        warnings.warn(
+        warn(
             f"{who}: {function.__name__} of {code.co_filename}, line {code.co_firstlineno}, is a new function at each call, "
             f"{TURNS} so far, and each compiles a new program. Define it once, outside of the loop, and pass what varies as "
-            "an array.",
-            JaxvehWarning,
-            stacklevel=3,
+            "an array."
         )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 
 import numpy as np
 
-from jaxveh._core.errors import JaxvehWarning
+from jaxveh._core.errors import warn
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import kit as diagnostics
 from jaxveh.estimators.cleaning import without_wild_values
@@ -58,11 +57,9 @@ def _lag(car: CarSpecification, recording: Recording) -> float:
 
 def _warn(seconds: float, error: float) -> None:
     words = f"{abs(seconds) * 1e3:.0f} ms (+-{2e3 * error:.0f}) too {'late' if seconds > 0 else 'early'}"
-    warnings.warn(
+    warn(
         f"sideslip: a_y comes {words}, judged by the car's model and yaw_rate; it is shifted by as much, and the car fitted "
-        "again. A remaining delay, up to 0.05 s, makes the estimate worse: correct the channel at its source.",
-        JaxvehWarning,
-        stacklevel=4,
+        "again. A remaining delay, up to 0.05 s, makes the estimate worse: correct the channel at its source."
     )
 
 

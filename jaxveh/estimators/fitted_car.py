@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Sequence
 
-from jaxveh._core.errors import JaxvehWarning
+from jaxveh._core.errors import warn
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.contract import Calibration
 from jaxveh.estimators.front_axle import front_axle
@@ -49,7 +48,7 @@ def fitted_car(
         why = "the front axle cannot be fitted to steer" if steered else "no log has both steer and a_y"
         if recordings:
             kept = f"fitted_car: {why}; the file's front axle and steer_offset are kept."
-            warnings.warn(kept, JaxvehWarning, stacklevel=2)
+            warn(kept)
         return found
     if told is not None:
         told = dataclasses.replace(told, B=told.B * new.front_cornering_stiffness / (told.B * told.C * told.D), S_h=0.0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import FilterError, InputError, JaxvehWarning
+from jaxveh._core.errors import FilterError, InputError, warn
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.rear_axle import RearAxle, rolling_below
@@ -96,11 +95,7 @@ def fit_rear_axle(
             "sideslip: the fit's likelihood is not finite: look at the span with `jaxveh check`, or take another."
         )
     if int(best.result) != 0:
-        warnings.warn(
-            f"sideslip: the fit ended after {int(best.steps)} steps ({best.reason}); its last values are used.",
-            JaxvehWarning,
-            stacklevel=3,
-        )
+        warn(f"sideslip: the fit ended after {int(best.steps)} steps ({best.reason}); its last values are used.")
     return _widened(best, np.asarray(problem.spread))
 
 
@@ -111,11 +106,9 @@ def _widened(fit: Fit, spread: np.ndarray) -> Fit:
     scale = np.outer(spread, spread)
     shares, directions = np.linalg.eigh(np.asarray(fit.covariance, float) / scale)
     if shares[0] < 0 or shares[-1] > 1 + UNSURE:
-        warnings.warn(
+        warn(
             "sideslip: the covariance of the fit is lost in rounding, its standard deviations are rough. Use float64: "
-            'jax.config.update("jax_enable_x64", True).',
-            JaxvehWarning,
-            stacklevel=4,
+            'jax.config.update("jax_enable_x64", True).'
         )
     shares = np.clip(shares, np.finfo(fit.covariance.dtype).eps, 1.0)
     told, wide = (

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning
+from jaxveh._core.errors import InputError, warn
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import ChannelMap
 from jaxveh.io.csv_layout import BLANKS, COMMENT, Layout, find_layout, with_numbers
@@ -58,7 +58,7 @@ def read_columns(path: Path, told: ChannelMap | None = None) -> TextTable:
     if frame.empty:
         raise InputError(f"{path}: the log is empty: it has columns but no row.")
     if remarks := (*layout.remarks, *remarks):
-        warnings.warn(f"{path}: {'; '.join(remarks)}.", JaxvehWarning, stacklevel=2)
+        warn(f"{path}: {'; '.join(remarks)}.")
     headings = _named(layout.headings, frame)
     _tell_short_rows(path, layout, headings, frame, "strict")
     cells = _cells(with_numbers(headings), frame) | _cells(headings, frame)
@@ -106,11 +106,9 @@ def _tell_short_rows(path: Path, layout: Layout, headings: Sequence[str], frame:
         return
     lacking = ", ".join(headings[min(short.values()) :])
     one = len(short) == 1
-    warnings.warn(
+    warn(
         f"{path}: {len(short)} {'row has' if one else 'rows have'} fewer cells than there are names ({len(headings)}), "
-        f"{'in' if one else 'first in'} line {min(short)}: the rest is NaN, in {lacking}. Was the file cut?",
-        JaxvehWarning,
-        stacklevel=3,
+        f"{'in' if one else 'first in'} line {min(short)}: the rest is NaN, in {lacking}. Was the file cut?"
     )
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning
+from jaxveh._core.errors import InputError, warn
 from jaxveh.io.channel_map import ChannelMap
 from jaxveh.io.csv_layout import text_encoding
 from jaxveh.io.log import TableLog
@@ -59,11 +58,9 @@ def open_haltech(path: Path, channels: ChannelMap | None) -> TableLog:
     scales = {name: SCALES.get(kind, (1.0, "")) for name, kind in zip(names, types, strict=True)}
     unknown = [f"{name} ({kind})" for name, kind in zip(names, types, strict=True) if kind not in SCALES]
     left = f"; as in the file, without a unit: {', '.join(unknown[:MOST])}" + ", ..." * (len(unknown) > MOST)
-    warnings.warn(
+    warn(
         f"{path}: the steps of its whole numbers are those in common use for their types (a speed: 0.1 km/h): compare one with a "
-        f"value that you know{left if unknown else ''}.",
-        JaxvehWarning,
-        stacklevel=2,
+        f"value that you know{left if unknown else ''}."
     )
     places = {"time": 0, **{name: k for k, name in enumerate(names, start=1)}}
 

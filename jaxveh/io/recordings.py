@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning, check_flags, path_of
+from jaxveh._core.errors import InputError, check_flags, path_of, warn
 from jaxveh._core.recording import Recording, check_recording
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
@@ -189,11 +188,7 @@ def _joined(path: Path, time: np.ndarray, values: dict[str, np.ndarray]) -> tupl
     joined = without_repeats(time, values) if repeats else None
     if joined is None:
         return time, values
-    warnings.warn(
-        f"{path}: {repeats} rows have the time of the row before and no other values: joined with it.",
-        JaxvehWarning,
-        stacklevel=3,
-    )
+    warn(f"{path}: {repeats} rows have the time of the row before and no other values: joined with it.")
     return joined
 
 
@@ -257,7 +252,7 @@ def _load_all(log: Log) -> dict[str, Column]:
     if left:
         first, *more = left
         names = f"{first!r}" + (f", and {len(more)} more ({', '.join(more[:MOST_OTHERS])})" if more else "")
-        warnings.warn(f"left out {names}: {left[first]}", JaxvehWarning, stacklevel=2)
+        warn(f"left out {names}: {left[first]}")
     return loaded
 
 

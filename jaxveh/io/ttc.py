@@ -11,14 +11,13 @@ SAE 2006-01-3606.
 from __future__ import annotations
 
 import csv
-import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning, path_of
+from jaxveh._core.errors import InputError, path_of, warn
 from jaxveh.io.csv_log import read_below
 from jaxveh.io.decimals import is_number
 from jaxveh.io.files import check_readable
@@ -143,7 +142,7 @@ def read_ttc(path: str | Path) -> TtcTable:
             f"{quantity} {unit}" for quantity, unit in METRIC.items() if quantity not in ("ratio", "number")
         )
         words = f"{path}: names no units; those of the consortium's metric files are assumed: {told}."
-        warnings.warn(words, JaxvehWarning, stacklevel=2)
+        warn(words)
     zero = np.zeros(len(columns["load"]))
     return TtcTable({"slip_angle": zero, "slip_ratio": zero, **columns}, cells.title, str(path))
 

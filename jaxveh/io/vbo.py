@@ -5,14 +5,13 @@ The format is Racelogic's "VBO file format": places in minutes, longitude positi
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning
+from jaxveh._core.errors import InputError, warn
 from jaxveh.io.channel_map import ChannelMap
 from jaxveh.io.csv_layout import BLANKS, text_encoding
 from jaxveh.io.csv_log import read_below
@@ -87,9 +86,5 @@ def _fixed(path: Path, sats: np.ndarray) -> np.ndarray:
     there = (np.nan_to_num(sats).astype(int) & SATELLITES) > 0
     if there.any():
         return there
-    warnings.warn(
-        f"{path}: `sats` is 0 in all rows: it is not used, so that rows without a satellite are not found.",
-        JaxvehWarning,
-        stacklevel=4,
-    )
+    warn(f"{path}: `sats` is 0 in all rows: it is not used, so that rows without a satellite are not found.")
     return ~there

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-import warnings
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
-from jaxveh._core.errors import InputError, JaxvehWarning
+from jaxveh._core.errors import InputError, warn
 from jaxveh.io.units import is_unit_name
 
 ALIASES = {
@@ -83,11 +82,9 @@ def units_of(path: Path, head: Head, standard: dict[str, str]) -> dict[str, str]
     titled = dict(zip(head.columns, map(_unit_of_title, head.titles), strict=False))
     told = dict(zip(head.columns[-len(head.units) :], head.units, strict=False)) if any(head.units) else {}
     if len(head.units) > len(head.columns) or any(told.get(name) for name in (*fixed, *assumed)):
-        warnings.warn(
+        warn(
             f"{path}: [channel units] has {len(head.units)} lines, which are not those of the last columns: they are not used. "
-            "Give units in a channel map.",
-            JaxvehWarning,
-            stacklevel=3,
+            "Give units in a channel map."
         )
         told = {}
     return {**assumed, **{n: u for n, u in titled.items() if u}, **{n: u for n, u in told.items() if u}, **fixed}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,12 +12,12 @@ import numpy as np
 from jaxveh._core.errors import (
     FilterError,
     InputError,
-    JaxvehWarning,
     check_flags,
     check_key,
     check_kind,
     check_one_of,
     is_concrete,
+    warn,
     word_for,
 )
 from jaxveh._core.names import as_mapping
@@ -244,11 +243,9 @@ def _warn_of_long_steps(driven: Driven, found: Solution, choice: SolverChoice, t
     limit, stable = stiffness.limits(choice.solver)
     pole, time = stiffness.worst(driven, times, found.x, found.u)
     if pole * choice.max_step > limit:
-        warnings.warn(
+        warn(
             f"simulate: steps of {choice.max_step:g} s are too long for a motion of {pole:.0f} 1/s at t = {time:g} s; the result "
-            f'there may be ringing of the solver. Take max_step = {stable / pole:.2g} s, or solver = "auto".',
-            JaxvehWarning,
-            stacklevel=4,
+            f'there may be ringing of the solver. Take max_step = {stable / pole:.2g} s, or solver = "auto".'
         )
 
 

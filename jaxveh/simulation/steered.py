@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
-from jaxveh._core.errors import JaxvehWarning, is_concrete
+from jaxveh._core.errors import is_concrete, warn
 from jaxveh.simulation.solve import Solution
 
 FURTHEST = 1.6
@@ -24,9 +22,7 @@ def warn_of_steer(found: Solution, times: np.ndarray) -> None:
         size = np.where(reached, np.abs(np.asarray(values)), 0.0)
         row = int(np.argmax(size))
         if size[row] > FURTHEST:
-            warnings.warn(
+            warn(
                 f"simulate: {name} is {float(np.asarray(values)[row]):.4g} rad at t = {times[row]:g} s, more than any road wheel "
-                "turns. Angles are in rad; are the inputs of a manoeuvre of your own in the order of their names?",
-                JaxvehWarning,
-                stacklevel=4,
+                "turns. Angles are in rad; are the inputs of a manoeuvre of your own in the order of their names?"
             )

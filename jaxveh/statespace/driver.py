@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import enum
 import functools
-import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, NamedTuple
 
@@ -15,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import FilterError, JaxvehWarning, check_flags, check_one_of, is_concrete
+from jaxveh._core.errors import FilterError, check_flags, check_one_of, is_concrete, warn
 from jaxveh._core.estimated import Estimated
 from jaxveh._core.fresh_functions import note_function
 from jaxveh._core.names import as_names
@@ -316,8 +315,4 @@ def warn_of_remarks(estimate: Estimate, filter) -> None:
     for reason, share in WORTH_TELLING.items():
         rows = int((remarks == reason).sum())
         if rows > share * remarks.size:
-            warnings.warn(
-                f"{type(filter).__name__}, in {rows} of {remarks.size} rows: {reason.message}.",
-                JaxvehWarning,
-                stacklevel=3,
-            )
+            warn(f"{type(filter).__name__}, in {rows} of {remarks.size} rows: {reason.message}.")

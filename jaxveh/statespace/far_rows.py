@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import equinox as eqx
@@ -11,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 
-from jaxveh._core.errors import JaxvehWarning, is_concrete
+from jaxveh._core.errors import is_concrete, warn
 from jaxveh.statespace.model import Row, StateSpace
 from jaxveh.statespace.solvers import Propagate
 
@@ -42,12 +41,10 @@ def warn_of_far_rows(model: StateSpace, rows: Row) -> None:
     worst = int(np.argmax(growth))
     if growth[worst] > GROWS:
         step = times[some[worst] + 1] - times[some[worst]]
-        warnings.warn(
+        warn(
             f"run: rows {step:.3g} s apart are too far for one step at t = {times[some[worst]]:g} s: it multiplies errors by "
             f"{growth[worst]:.3g}, and the estimate may be wrong there. Take more steps between rows, e.g. "
-            "state_space(..., steps=4), or solver=statespace.StabilisedRK4(); split the recording at a gap.",
-            JaxvehWarning,
-            stacklevel=3,
+            "state_space(..., steps=4), or solver=statespace.StabilisedRK4(); split the recording at a gap."
         )
 
 

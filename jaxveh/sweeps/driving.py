@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from typing import Any, Protocol
 
-from jaxveh._core.errors import InputError, JaxvehWarning
+from jaxveh._core.errors import InputError, warn
 from jaxveh.sweeps.chunks import Unfit
 
 TRIES = 3
@@ -98,7 +97,7 @@ def drive(
             # No worker computes: chunks that are out keep their time.
             out = {future: (number, end + now - before) for future, (number, end) in out.items()}
             if not is_told:
-                warnings.warn(NOBODY, JaxvehWarning, stacklevel=4)
+                warn(NOBODY)
         is_told = crew.workers == 0
         for future in [f for f, (_, end) in out.items() if now > end]:
             number, _ = out.pop(future)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import threading
-import warnings
 from collections.abc import Iterator
 
-from jaxveh._core.errors import JaxvehWarning
+from jaxveh._core.errors import warn
 
 
 @contextlib.contextmanager
@@ -28,11 +27,9 @@ def warn_when_late(what: str, patience: float | None) -> Iterator[None]:
 def _watch(what: str, patience: float, ended: threading.Event) -> None:
     times = 1
     while not ended.wait(patience):
-        warnings.warn(
+        warn(
             f"sweep: {what} has not finished for {times * patience:g} s. If the processor is busy, it may only be slow: a "
             "smaller batch= reports progress more often. If the processor is idle, it will never end: stop it, and run "
-            "again on one device (devices=jax.devices()[:1], or JAX_NUM_CPU_DEVICES=1 in the environment).",
-            JaxvehWarning,
-            stacklevel=1,
+            "again on one device (devices=jax.devices()[:1], or JAX_NUM_CPU_DEVICES=1 in the environment)."
         )
         times += 1

@@ -15,7 +15,6 @@ import os
 import shutil
 import tempfile
 import time
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning, check_whole, path_of
+from jaxveh._core.errors import InputError, check_whole, path_of, warn
 from jaxveh._core.progress import Progress
 from jaxveh.io import kit
 from jaxveh.sweeps import identity
@@ -92,7 +91,7 @@ def sweep_into(
             with crew_for(client, processes, packed, lambda number: packed_arguments(arguments(number))) as crew:
                 limit = float("inf") if patience is None else patience
                 drive(crew, mine, limit, told, store.write_failure)
-    _warn_of_missing(store, is_mine, stacklevel=4)
+    _warn_of_missing(store, is_mine)
     return _found(store)
 
 
@@ -242,7 +241,7 @@ def read_sweep(path: str | os.PathLike) -> Swept:
     those that failed, with the first error.
     """
     store = Store(path)
-    _warn_of_missing(store, lambda number: True, stacklevel=3)
+    _warn_of_missing(store, lambda number: True)
     return _found(store)
 
 
@@ -250,7 +249,7 @@ def _found(store: Store) -> Swept:
     return Swept(store.design(), store.plan.shape[-1], Values(store), **store.about)
 
 
-def _warn_of_missing(store: Store, is_asked: Callable[[int], bool], stacklevel: int) -> None:
+def _warn_of_missing(store: Store, is_asked: Callable[[int], bool]) -> None:
     """Warn about chunks of this call that are not done."""
     status = store.status()
     missing = [int(i) for i in np.flatnonzero(status != DONE) if is_asked(int(i))]
@@ -258,10 +257,8 @@ def _warn_of_missing(store: Store, is_asked: Callable[[int], bool], stacklevel: 
         return
     failed = [i for i in missing if status[i] == FAILED]
     why = f"; {len(failed)} of them failed: {_last_line(store.error(failed[0]))}" if failed else ""
-    warnings.warn(
-        f"{store.path}: {len(missing)} of {store.plan.chunks} chunks are not done{why}. The same sweep again goes on with them.",
-        JaxvehWarning,
-        stacklevel=stacklevel,
+    warn(
+        f"{store.path}: {len(missing)} of {store.plan.chunks} chunks are not done{why}. The same sweep again goes on with them."
     )
 
 

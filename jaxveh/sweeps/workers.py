@@ -12,12 +12,11 @@ from __future__ import annotations
 import math
 import os
 import re
-import warnings
 from typing import Any
 
 import jax
 
-from jaxveh._core.errors import JaxvehWarning
+from jaxveh._core.errors import warn
 
 WHOLE_AGAIN = (0, 12)
 """The first jax whose LAPACK kernels compute a batch without other workers."""
@@ -49,12 +48,10 @@ def fit_for(program: Any, devices: list) -> list:
         return devices
     fit = (workers() - 1) // places
     if fit == 0:
-        warnings.warn(
+        warn(
             f"{places} kernels of this program may at once block one of the {workers()} workers of jax {jax.__version__}; once "
             f"all are blocked, it never ends. Set the environment variable {POOL} to {places + 1} or more before jax starts, "
-            "or take jax 0.12.",
-            JaxvehWarning,
-            stacklevel=2,
+            "or take jax 0.12."
         )
     return devices[: max(fit, 1)]
 

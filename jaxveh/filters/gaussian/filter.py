@@ -2,7 +2,6 @@
 
 import abc
 import dataclasses
-import warnings
 from typing import Any, ClassVar
 
 import equinox as eqx
@@ -11,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.contracts import contract
-from jaxveh._core.errors import InputError, JaxvehWarning, check, kind_of_inner, word_for
+from jaxveh._core.errors import InputError, check, kind_of_inner, warn, word_for
 from jaxveh._core.names import record
 from jaxveh._core.own_results import belief_and_info, instance_of, not_none, of_kind
 from jaxveh._core.result import Result, with_reason
@@ -173,12 +172,10 @@ def check_weights(filter: AbstractRuleFilter, model: StateSpace) -> None:
     lost = rule.amplification * float(jnp.finfo(dtype).eps)
     if lost > MOST_LOST:
         # Python shows a warning once if its words do not change with the numbers.
-        warnings.warn(
+        warn(
             f"{type(filter).__name__}: its weights cancel each other, so that in {dtype} means are rounded to {lost:.1g} of "
             "their size, and estimates and likelihoods have larger errors. Take points further out (alpha = 1, the default), "
-            "or float64.",
-            JaxvehWarning,
-            stacklevel=3,
+            "or float64."
         )
 
 
