@@ -71,10 +71,12 @@ def test_a_federation_that_resets_is_the_filter_of_all_sensors(name):
         )
 
 
-def test_locals_that_go_on_from_their_own_estimates_are_fused_by_information():
-    """Each with the covariances of the prior and of the process noise over its share; the alarm is a fading mean."""
-    shares, forgets = (0.3, 0.7), 0.8
-    filter_ = filters.Federated(filters.Kalman(), GROUPS, shares, reset=False, forgetting=forgets)
+@pytest.mark.parametrize("isolate", [None, 1.02])
+def test_locals_that_go_on_from_their_own_estimates_are_fused_by_information(isolate):
+    """Each with the covariances of the prior and of the process noise over its share; the alarm is a fading mean, beyond which a
+    local goes on from its prediction."""
+    shares, forgets, used = (0.3, 0.7), 0.8, set()
+    filter_ = filters.Federated(filters.Kalman(), GROUPS, shares, reset=False, isolate=isolate, forgetting=forgets)
     found = filters.run(filter_, MODEL, RECORDING)
     x, P = start()
     locals_ = [(x, P / share) for share in shares]
@@ -87,11 +89,14 @@ def test_locals_that_go_on_from_their_own_estimates_are_fused_by_information():
         for c in np.flatnonzero(np.isfinite(SEEN[k])):
             nis = (SEEN[k, c] - H[c] @ mean - D[c] * FORCE[k]) ** 2 / (H[c] @ together @ H[c] + R[c])
             alarm[c] = forgets * alarm[c] + (1 - forgets) * nis
-        locals_ = [after(k, *local, [c]) for c, local in enumerate(locals_)]
+        trusted = alarm < (np.inf if isolate is None else isolate)
+        used.add(tuple(trusted))
+        locals_ = [after(k, *local, [c] if trusted[c] else []) for c, local in enumerate(locals_)]
         P = np.linalg.inv(sum(np.linalg.inv(P) for _, P in locals_))
         compare(found, k, P @ sum(np.linalg.solve(P, x) for x, P in locals_), P)
     np.testing.assert_allclose(found.belief.alarm, alarm, rtol=1e-8)
     np.testing.assert_allclose(found.belief.locals[1].vector, locals_[1][0], rtol=1e-8)
+    assert used == ({(True, True)} if isolate is None else {(True, True), (True, False)})
 
 
 def test_a_gate_leaves_out_what_is_too_far_off():

@@ -156,7 +156,7 @@ class Federated(AbstractWrapper):
         trusted = jnp.ones(len(self.groups), bool) if self.isolate is None else alarm < self.isolate
         # If all local filters are suspect, none can be judged by the others, and all are used.
         trusted = trusted | ~jnp.any(trusted)
-        believed = jax.vmap(either)(trusted, found, ahead)
+        believed = jax.vmap(either)(trusted, found, jax.vmap(lambda local: _after(local, row))(ahead))
         master = self._fuse(believed, belief.inside, predicted if self.common else None)
         master = with_spread(
             master, master.vector, Spread(master.factor, master.matrix), row.t, row.u, belief.count + 1
@@ -207,6 +207,11 @@ def _only(row: Row, group: tuple[str, ...]) -> Row:
     return row._replace(
         y=record("Measurements", {n: v if n in group else jnp.full_like(v, jnp.nan) for n, v in y.items()})
     )
+
+
+def _after(local: GaussianBelief, row: Row) -> GaussianBelief:
+    """A local's prediction as its belief after the row, from whose inputs the next step goes on."""
+    return with_spread(local, local.vector, Spread(local.factor, local.matrix), row.t, row.u, local.count + 1)
 
 
 def _count(row: Row, group: tuple[str, ...]) -> Any:
