@@ -212,6 +212,20 @@ def test_friction_bounds_the_force(name, angle, ratio, load, friction):
     assert np.hypot(F_x, F_y) <= LAWS[name].bound * friction * load * (1 + 1e-12) + 1e-100
 
 
+@pytest.mark.whole
+@pytest.mark.parametrize("name", BOUNDED)
+def test_no_force_jumps_where_a_tyre_begins_to_slide_nor_exceeds_its_friction(name):
+    """Turned, braked, and both: between slips a quarter as far apart a force changes a quarter as much, but for a jump."""
+    slips, zeros = np.linspace(0.0, 1.2, 4001), np.zeros(4001)
+    angles, ratios = np.stack([slips, zeros, slips]), np.stack([zeros, slips, slips])
+    forces = LAWS[name].make().forces(contact(angles, ratios, np.full(angles.shape, LOAD)))
+    assert np.max(np.hypot(forces.F_x, forces.F_y)) <= LAWS[name].bound * LOAD * (1 + 1e-12)
+    for part in forces:
+        along = np.broadcast_to(part, angles.shape)
+        near, far = (np.abs(np.diff(along[:, ::step])).max(axis=1) for step in (1, 4))
+        assert np.all(near <= 0.6 * far)
+
+
 @pytest.mark.parametrize("name", those(symmetric=True))
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(ANGLES, RATIOS, LOADS)
