@@ -294,6 +294,17 @@ def test_what_is_left_of_a_force_is_the_share_of_it_alone(name):
     np.testing.assert_allclose(np.min(left), share, rtol=0.02)
 
 
+@pytest.mark.parametrize(("key", "numbers"), [("KPUMIN", (0, 0.2)), ("ALPMAX", (0, -0.2))])
+def test_a_range_without_braking_or_turning_has_no_combined_slip_to_judge(key, numbers):
+    """Its weights would reverse both forces, and both have shifts, so that they are forces at no slip, too."""
+    spoilt = GOOD.replace("RCX1 = 0.9", "RCX1 = 1.6\nPHX1 = 0.01\nPVX1 = 0.02")
+    spoilt = spoilt.replace("RCY1 = 1\n", "RCY1 = 1.6\nPVY1 = 0.02\n").replace("PHY1 = 0\n", "PHY1 = 0.004\n")
+    told = lambda text: [line.partition(":")[0] for line in found(text) if " reverse F_" in line]
+    assert told(spoilt) == ["RBX1 to RHX1 reverse F_x", "RBY1 to RHY2 reverse F_y"]
+    for number in numbers:
+        assert told(re.sub(rf"(?m)^{key} = .*$", f"{key} = {number}", spoilt)) == []
+
+
 def test_loads_are_looked_at_from_a_tenth_to_three_times_the_nominal_one():
     wide = tyres.from_property_file(parse_property_file(GOOD.replace("FZMAX = 10000", "FZMAX = 1e5")))
     loads = property_check._loads(wide)
