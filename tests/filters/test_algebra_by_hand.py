@@ -11,11 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from filter_systems import spd
+from test_every_filter import FILTERS
 
 from jaxveh import InputError, Result, filters, numerics
 from jaxveh import statespace as ss
 from jaxveh.filters.auxiliary import FirstStage
 from jaxveh.filters.choosing import choose_ancestors, log_of
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter
 from jaxveh.filters.gaussian.forms import Later, Spread, masked_factor
 from jaxveh.filters.gaussian.rules import Image, spread_of
 from jaxveh.filters.looking_ahead import lookahead_for, remark_of, soften
@@ -121,6 +123,10 @@ def test_every_form_smooths_as_the_equations_say(kind, noise):
     assert isinstance(found.spread, Spread)
 
 
+MADE = [line.make() for line in reversed(FILTERS.values())]
+RULED = {filter_.rule(2): filter_ for filter_ in MADE if isinstance(filter_, AbstractRuleFilter)}
+"""One filter of each rule: forms make no difference to what it sees."""
+
 X = namedtuple("X", "x angle")
 Y = namedtuple("Y", "far angle")
 
@@ -148,6 +154,15 @@ PROCESS = {
         [[0.16, 0.03], [0.03, 0.04]],
     ),
 }
+
+
+@pytest.mark.parametrize("filter_", RULED.values(), ids=lambda filter_: type(filter_).__name__)
+def test_the_image_of_a_missing_channel_is_zero(filter_):
+    """By whatever rule, and exactly: what rounding leaves there would count beside its error's unit variance."""
+    model = curved(PROCESS["full"][0], ss.MultivariateGaussian(Y._fields, R))
+    row = Row(jnp.asarray(0.0), None, Y(jnp.asarray(0.9), jnp.asarray(np.nan)))
+    found = filter_.observe(model, filter_.prior(model, row), row)
+    assert found.mean[1] == 0.0 and not np.any(found.deviations[1]) and np.ptp(found.deviations[0]) > 0.1
 
 
 def log_normal(z, S):
