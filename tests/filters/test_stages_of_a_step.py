@@ -33,6 +33,14 @@ WAYS = {
 ROWS = MODEL.rows(Recording(TIME[:2], {"flow": np.array([9.0, 4.0])}))
 DT = TIME[1] - TIME[0]
 
+FORESEEN = {
+    "AuxiliaryParticleFilter": (0.3, Q * DT + R),
+    "AuxiliaryParticleFilter, to a point": (0.3, R),
+    "Guided, auxiliary": (0.0, Q * DT + R),
+}
+"""The share of ancestors that are drawn by their weights alone (of other filters all are), and the variance with which the next
+measurement is foreseen."""
+
 
 def normal(y, mean, variance):
     return np.exp(-0.5 * (y - mean) ** 2 / variance) / np.sqrt(2.0 * np.pi * variance)
@@ -65,10 +73,14 @@ def test_weights_are_densities_over_chances(name, way):
     step = lambda belief: (filter_._predict(MODEL, belief, ROW), *filter_.step(MODEL, belief, ROW))
     predicted, after, info = jax.jit(step)(belief)
     x, chosen = np.asarray(after.particles.level), np.asarray(after.ancestors)
-    chances = np.asarray(predicted.stage.weights) if hasattr(predicted, "stage") else w
+    y, ahead = float(ROW.y.flow), (1.0 - 0.2 * DT) * before[chosen]
+    alone, variance = FORESEEN.get(name, (1.0, R))
+    foreseen = normal(y, (1.0 - 0.2 * DT) * before, variance)
+    chances = w * (alone + (1.0 - alone) * foreseen / np.sum(w * foreseen))
+    if hasattr(predicted, "stage"):
+        np.testing.assert_allclose(predicted.stage.weights, chances, rtol=1e-9)
     if way == "softly":
         chances = SHARE * chances + (1.0 - SHARE) / N
-    y, ahead = float(ROW.y.flow), (1.0 - 0.2 * DT) * before[chosen]
     # A guided move is drawn from p(x | before, y), so that what is left of the densities is p(y | before).
     density = normal(y, ahead, Q * DT + R) if "Guided" in name else normal(y, x, R)
     kept = w if way == "never" else (w / (N * chances))[chosen]
