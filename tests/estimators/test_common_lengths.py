@@ -62,6 +62,7 @@ def test_a_second_log_of_similar_length_compiles_nothing(quantity, compiled):
         assert compiled.during(lambda way=way: way(drive(SHORTER, needs, start=7))) == 0, name
 
 
+@pytest.mark.thorough
 def test_neither_does_a_second_calibration_and_the_estimate_with_its_bands(compiled):
     sideslip = estimators.sideslip
 
