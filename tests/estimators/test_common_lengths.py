@@ -2,6 +2,7 @@
 
 The quantities are those that `estimators.__all__` lists."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import method_logs
@@ -139,3 +140,26 @@ def test_the_shortest_logs_have_answers_too(quantity, rows):
     for smoothed in {False, isinstance(method, kit.AbstractSmoothable)}:
         said = kit.follow(quantity, method, drive(rows, method.needs), smoothed=smoothed)
         assert all(np.shape(leaf) == (rows,) for leaf in jax.tree.leaves(said))
+
+
+@pytest.mark.whole
+def test_what_is_traced_is_not_filled_up():
+    """Inside jit, batches and gradients, whose programs are of one length anyway; nothing is compiled here."""
+    method, sideslip = made("bank", estimators.bank.RECOMMENDED), estimators.sideslip
+    log, few = drive(SHORTER, method.needs), drive(SHORTER, sideslip.needs)
+    model = sideslip.model(method_logs.CAR)
+    clean = cleaning.clean(few, cleaning.RearAxleCleaning(2.7))
+    numbers, rest = eqx.partition(method, eqx.is_inexact_array)
+    stiffer = lambda scale: eqx.tree_at(lambda m: m.system.stiffness, model, scale * model.system.stiffness)
+    ways = {
+        "rows": (lambda a_y: kit.follow("bank", method, log.replace(a_y=a_y)).mean, log["a_y"]),
+        "smoothed": (lambda a_y: kit.follow("bank", method, log.replace(a_y=a_y), smoothed=True).mean, log["a_y"]),
+        "numbers": (lambda numbers: kit.follow("bank", eqx.combine(numbers, rest), log).mean, numbers),
+        "cleaning": (lambda a_y: dict(cleaning.clean(few.replace(a_y=a_y)).channels), few["a_y"]),
+        "smoother": (lambda scale: filters.smooth(filters.Extended(), stiffer(scale), clean).mean, jnp.ones(())),
+        "estimate": (lambda scale: sideslip.estimate(stiffer(scale), few).mean, jnp.ones(())),
+    }
+    for name, (way, at) in ways.items():
+        found = jax.eval_shape(way, at)
+        assert {leaf.shape for leaf in jax.tree.leaves(found)} == {(SHORTER,)}, name
+        jax.eval_shape(jax.grad(lambda at, way=way: sum(jnp.nansum(leaf) for leaf in jax.tree.leaves(way(at)))), at)
