@@ -33,7 +33,7 @@ INSIDE = ("jaxveh", "jax", "equinox", "optimistix", "diffrax")
 def warn(message: str) -> None:
     """Warn of something unusual (`JaxvehWarning`), at the line of the caller's own code."""
     frame, level = inspect.currentframe(), 1
-    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in INSIDE:
+    while frame is not None and (frame.f_globals.get("__name__") or "").partition(".")[0] in INSIDE:
         frame, level = frame.f_back, level + 1
     warnings.warn(message, JaxvehWarning, stacklevel=level)
 

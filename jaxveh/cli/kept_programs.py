@@ -141,8 +141,10 @@ def drop_unused(place: Path) -> None:
     with contextlib.suppress(filelock.Timeout), filelock.FileLock(place / LOCK, timeout=1.0):
         programs = sorted(place.glob(f"*{PROGRAM}"), key=_last_use, reverse=True)
         for program in programs[LEFT:]:
-            program.unlink(missing_ok=True)
-            _of_last_use(program).unlink(missing_ok=True)
+            # A file that another program holds stays.
+            with contextlib.suppress(OSError):
+                program.unlink(missing_ok=True)
+                _of_last_use(program).unlink(missing_ok=True)
 
 
 def _of_last_use(program: Path) -> Path:

@@ -248,5 +248,5 @@ def clean(recording: Recording, cleaning: RearAxleCleaning | None = None) -> Rec
     if cleaning is not None:
         check_kind("cleaning", cleaning, AbstractCleaning, "Such as the `cleaning` of estimators.sideslip.live(car).")
     check_needs("sideslip", BLIND, recording)
-    absent = {need.channel: jnp.full(len(recording), jnp.nan) for need in BLIND if need.channel not in recording}
+    absent = {need.channel: np.full(len(recording), np.nan) for need in BLIND if need.channel not in recording}
     return clean_recording(RearAxleCleaning() if cleaning is None else cleaning, recording.replace(**absent))

@@ -130,10 +130,8 @@ def _smoothed_with_members(
 def _followed_with_members(
     filter: AbstractFilter, model: StateSpace, members: Members, rows: Row, count: Any
 ) -> Estimate:
-    form = kit.scan_in_form(filter, model, rows, None, lambda belief: belief, kit.SHOWN, kit.Steps.whole, count)
-    (found, beliefs), last = form, -1 if count is None else count - 1
-    std = _std_of_members(filter, members, rows, found.mean)
-    return dataclasses.replace(found, std=std, belief=jax.tree.map(lambda leaf: leaf[last], beliefs))
+    found, _ = kit.scan_in_form(filter, model, rows, None, lambda belief: None, kit.SHOWN, kit.Steps.whole, count)
+    return dataclasses.replace(found, std=_std_of_members(filter, members, rows, found.mean))
 
 
 def _std_of_members(filter: AbstractFilter, members: Members, rows: Row, centre: Any) -> Any:

@@ -29,7 +29,7 @@ def of_common_length(program: Callable[..., Any], rows: Row, *given: Any) -> Any
 
 def _shorten_estimate(estimate: Any, count: int) -> Any:
     """An `Estimate` or a smoothed one with its first rows."""
-    parts = {name: shorten(getattr(estimate, name), count) for name in estimate.by_row}
+    parts = {name: shorten(getattr(estimate, name), count) for name in ("time", *estimate.by_row)}
     if hasattr(estimate, "filtered"):
         parts["filtered"] = _shorten_estimate(estimate.filtered, count)
     return dataclasses.replace(estimate, **parts)

@@ -217,14 +217,20 @@ def scan_in_form(
     filter: AbstractFilter, model: StateSpace, rows: Row, key, of_belief: Callable, keep: tuple[str, ...], steps: Steps,
     count: Any = None,
 ) -> tuple[Estimate, Any]:  # fmt: skip
-    """The results of `scan_and_keep`, with steps of one kind; `count` as in `estimate_of`."""
+    """The results of `scan_and_keep`, with steps of one kind; `count` as in `estimate_of`. After the last row that is there, the
+    belief stays as it is."""
     whole, complete = steps is Steps.whole, steps is Steps.complete
     first, rest = jax.tree.map(lambda leaf: leaf[0], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
+    there = None if count is None else jnp.arange(1, len(rows.t)) < count
 
-    def body(belief, row):
+    def body(belief, given):
+        row, here = given
         told = model, belief, row
-        belief, info = numerics.apart(filter._next, belief.count, *told) if whole else filter._next(*told)
-        return belief, (estimate_of_row(model, belief, info, keep), of_belief(belief))
+        after, info = numerics.apart(filter._next, belief.count, *told) if whole else filter._next(*told)
+        shown = estimate_of_row(model, after, info, keep)
+        if here is not None:
+            after = jax.tree.map(lambda new, old: jnp.where(here, new, old), after, belief)
+        return after, (shown, of_belief(after))
 
     if complete:
         belief, info = numerics.write_out(lambda row: filter._first(model, row, key), first, complete=True)
@@ -232,7 +238,7 @@ def scan_in_form(
         belief, info = filter.init(model, first, key)
     start = estimate_of_row(model, belief, info, keep), of_belief(belief)
 
-    belief, rest = scan_by(steps, body, belief, rest)
+    belief, rest = scan_by(steps, body, belief, (rest, there))
     shown, kept = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, rest)
     return estimate_of(model, rows.t, shown, belief, count), kept
 

@@ -159,6 +159,24 @@ def test_while_another_start_writes_none_is_deleted(own, monkeypatch):
     assert (own / "jit_f-1-cache").exists()
 
 
+def test_a_program_that_cannot_be_deleted_stays_and_the_others_go(own, monkeypatch):
+    monkeypatch.setattr(kept_programs, "MOST_PROGRAMS", 1)
+    monkeypatch.setattr(kept_programs, "LEFT", 0)
+    own.mkdir()
+    for number in range(3):
+        (own / f"jit_f-{number}-cache").write_bytes(b"program")
+    unlink = kept_programs.Path.unlink
+
+    def held(self, **more):
+        if self.name == "jit_f-1-cache":
+            raise PermissionError("held by another program")
+        unlink(self, **more)
+
+    monkeypatch.setattr(kept_programs.Path, "unlink", held)
+    kept_programs.drop_unused(own)
+    assert [file.name for file in own.glob("*-cache")] == ["jit_f-1-cache"]
+
+
 def test_show_and_clear(own):
     assert run("cache", "show").stdout == f"{own}: nothing is kept yet\n"
     folder = own / "jaxveh-0.1.0-jaxlib-0.10.0-abc"

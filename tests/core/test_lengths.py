@@ -1,5 +1,7 @@
 """Lengths that logs of similar length share."""
 
+import warnings
+
 import jax
 import numpy as np
 
@@ -35,3 +37,14 @@ def test_rows_are_added_at_the_end_and_taken_off_again_without_compiling():
     np.testing.assert_array_equal(times[:37], time)
     assert (np.diff(times) > 0).all() and abs(float(times[-1]) - time[-1] - 1.1) < 1e-6
     np.testing.assert_array_equal(alone, time[0] + np.arange(4.0))
+
+
+def test_rows_stay_on_their_device_and_times_may_be_too_large():
+    devices = jax.devices()
+    there = jax.device_put(np.arange(50.0), devices[-1])
+    assert shorten({"x": there}, 30)["x"].devices() == {devices[-1]}
+    assert shorten(np.arange(5.0), 3).shape == (3,)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        times = lengthen_time(np.asarray([0.0, 2e38], np.float32), 8)
+    assert times.shape == (8,) and np.isinf(times[-1])

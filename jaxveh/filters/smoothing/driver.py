@@ -35,7 +35,8 @@ def smooth(
     Rauch-Tung-Striebel smoother of its own rule and form. A particle filter has `method`, by default
     `BackwardSampling()` if every state has process noise, otherwise `Genealogy()`.
 
-    Gaussian smoothers are differentiable with respect to array leaves of `model`.
+    Gaussian smoothers are differentiable with respect to array leaves of `model`. Outside of transformations, recordings of
+    similar length share one compiled program.
 
     **Raises** as `run`, and `InputError` if the method does not suit the filter or the model, or if the filter's class
     does not declare that it can be smoothed (`AbstractFilter.smooths`).

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -65,7 +64,7 @@ def _smoothed_in_form(
     filtered, beliefs = kit.scan_in_form(filter, model, rows, None, kept, kit.SHOWN, steps, count)
     whole = lambda belief: numerics.from_entries(belief, filtered.belief) if in_scalars else belief
     there = None if count is None else jnp.arange(1, len(rows.t)) < count
-    last = whole(jax.tree.map(lambda leaf: leaf[-1 if count is None else count - 1], beliefs))
+    last = whole(jax.tree.map(lambda leaf: leaf[-1], beliefs))
     before = jax.tree.map(lambda leaf: leaf[:-1], beliefs)
     after = jax.tree.map(lambda leaf: leaf[1:], (rows.t, rows.u))
 
@@ -76,5 +75,4 @@ def _smoothed_in_form(
         return found, found.moments(model)
 
     _, moments = kit.scan_by(steps, back, gaussian_of(last), (before, after, there), reverse=True)
-    filtered = dataclasses.replace(filtered, belief=last)
     return smoothed_estimate(model, filtered, with_last(moments, last.moments(model)))
