@@ -37,8 +37,8 @@ MOST = 1_000_000_000
 
 MOST_PROGRAMS, LEFT = 1000, 500
 """If a start finds more programs than the first number, it deletes those unused for longest until the second is left. Before jax
-writes a program, it reads when each kept one was last used: 15 to 40 ms for 1000 of them, 0.7 s for 30,000, which are fewer than
-`MOST` bytes. A start of `estimate` with a log of a new length writes about five."""
+writes a program, it reads when each kept one was last used: 37 ms for 1000 of them, 0.7 s for 30,000 (a slow machine), which are
+fewer than `MOST` bytes. The first start of `estimate` writes some fifty."""
 
 LAST_USE, LOCK = "-atime", ".lockfile"
 """What jax puts in the place of `PROGRAM` in the name of the file with a program's last use, and the file by which it keeps
