@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from test_every_method import QUANTITIES, every_quantity, made
 
-from jaxveh import Recording, estimators, filters
+from jaxveh import Recording, estimators, filters, statespace
 from jaxveh._core.lengths import common_length
 from jaxveh.estimators import cleaning, kit
 
@@ -120,6 +120,16 @@ def test_an_estimate_without_smoothing_is_that_of_the_filter():
         assert len(one) == len(other) > 0, name
         for a, b in zip(one, other, strict=True):
             np.testing.assert_allclose(a, b, 1e-12 if name == "log_likelihood" else 0.0, err_msg=name)
+
+
+def test_an_estimate_of_a_common_length_has_the_rows_of_its_own():
+    sideslip = estimators.sideslip
+    model = sideslip.model(method_logs.CAR)
+    rows = model.rows(cleaning.clean(drive(SHORTER, sideslip.needs), cleaning.RearAxleCleaning(2.7)))
+    found = statespace.kit.of_common_length(filters.kit.rauch_tung_striebel, rows, filters.Extended(), model)
+    for estimate in (found, found.filtered):
+        parts = [getattr(estimate, name) for name in ("time", *estimate.by_row)]
+        assert {leaf.shape for leaf in jax.tree.leaves(parts)} == {(SHORTER,)}
 
 
 def test_wild_values_are_those_of_the_rows_alone():
