@@ -27,9 +27,11 @@ def a_y_delay(fitted: CarSpecification, told: CarSpecification, recordings: Sequ
 
     The `fitted` car is tried first. A fit may mistake a delay for a soft axle, so the car as `told` (as given) is tried next;
     its delay counts only if it exceeds the error that a wrong stiffness could cause. A `JaxvehWarning` reports a delay that was
-    found.
+    found. Where the rear wheels are steered, a_y is not timed: how it follows the yaw rate depends on their angle.
     """
     recordings = [without_wild_values(one, told.wheelbase) for one in recordings]
+    if not told.steers_front_alone:
+        return 0.0
     for car, softer in ((fitted, 0.0), (told, SOFTER)):
         usual = USUAL + softer * max(_lag(car, one) for one in recordings)
         seconds, error = _found(car, recordings)
@@ -63,8 +65,8 @@ def _warn(seconds: float, error: float) -> None:
     )
 
 
-FELT = ("a_x", "a_y", "yaw_rate")
-"""Channels that may be behind the low-pass of a car's file (`low_pass`)."""
+FELT = ("a_x", "a_y", "yaw_rate", "steer_rear")
+"""Channels that may be behind the low-pass of a car's file (`low_pass`); `RearSteer` has given its angle the same delay."""
 
 
 def on_time(recording: Recording, system: RearAxle) -> Recording:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.delays import satellite_lag
-from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable, Answer
-from jaxveh.estimators.sequential import Belief
+from jaxveh.estimators.method import AbstractMethod
+from jaxveh.estimators.prepared import AbstractPreparation, prepared
 from jaxveh.io import CarSpecification
 
 YAW_RATE, SPEED = Need("yaw_rate", "rad/s", optional=True), Need("speed", "m/s", optional=True)
@@ -39,14 +40,6 @@ class Turning(NamedTuple):
     speed: Any
 
 
-class MovedMemory(NamedTuple):
-    """The memory of the inner method, the car's `turning`, and the inner method's belief if it can be smoothed."""
-
-    inner: Any
-    turning: Turning
-    belief: Belief | None
-
-
 def moved_to_centre(a_x: Any, a_y: Any, yaw_rate: Any, yaw_acceleration: Any, x: Any, y: Any) -> tuple[Any, Any]:
     """Accelerations (m/s^2) of the centre of gravity in a plane motion, from those at a place `x` ahead and `y` to the left of it
     (m)."""
@@ -54,45 +47,34 @@ def moved_to_centre(a_x: Any, a_y: Any, yaw_rate: Any, yaw_acceleration: Any, x:
     return a_x + yaw_acceleration * y + turns * x, a_y - yaw_acceleration * x + turns * y
 
 
-class AtCentre(AbstractMethod):
-    """A method that hears accelerations, course and speed over ground of the centre of gravity, from those of an inertial unit at
-    (`unit_x`, `unit_y`) and of an antenna at (`antenna_x`, `antenna_y`) (m, forward and left of it).
+class AtCentre(AbstractPreparation):
+    """Accelerations, course and speed over ground of the centre of gravity, from those of an inertial unit at (`unit_x`,
+    `unit_y`) and of an antenna at (`antenna_x`, `antenna_y`) (m, forward and left of it).
 
     The motion is plane: a rolling or pitching body's part, which depends on the heights, is left. The yaw acceleration is the
-    slope of the yaw rate through a low-pass of `smoothing` (s); satellites are late by `lag` (s) against the unit.
+    slope of the yaw rate through a low-pass of `smoothing` (s); satellites are late by `lag` (s) against the unit. `over_ground`:
+    whether the course is moved, which takes a speed.
     """
 
-    inner: AbstractMethod
     unit_x: jax.Array = parameter("m", default=0.0)
     unit_y: jax.Array = parameter("m", default=0.0)
     antenna_x: jax.Array = parameter("m", default=0.0)
     antenna_y: jax.Array = parameter("m", default=0.0)
     smoothing: jax.Array = positive("s", default=0.03)
     lag: jax.Array = parameter("s", scale=0.1, default=0.125)
-
-    knows_places: ClassVar[bool] = True
+    over_ground: bool = eqx.field(static=True, default=False)
 
     @property
-    def needs(self):
-        there = {need.channel for need in self.inner.needs}
-        more = (YAW_RATE, SPEED) if "course" in there else (YAW_RATE,)
-        return (*self.inner.needs, *[need for need in more if need.channel not in there])
+    def more(self):
+        return (YAW_RATE, SPEED) if self.over_ground else (YAW_RATE,)
 
     def first(self, t, values):
         nothing = jnp.zeros_like(t)
         said = jnp.where(jnp.isnan(values["yaw_rate"]), nothing, values["yaw_rate"])
-        start = Turning(t, said, said, said, nothing + 2.0 * LONGEST_SILENCE, nothing)
-        turning, moved = self._moved(start, t, values)
-        inner, answer = self.inner.first(t, moved)
-        return self._memory(inner, turning), answer
+        return self._moved(Turning(t, said, said, said, nothing + 2.0 * LONGEST_SILENCE, nothing), t, values)
 
     def next(self, memory, t, values):
-        turning, moved = self._moved(memory.turning, t, values)
-        inner, answer = self.inner.next(memory.inner, t, moved)
-        return self._memory(inner, turning), answer
-
-    def _memory(self, inner: Any, turning: Turning) -> MovedMemory:
-        return MovedMemory(inner, turning, None)
+        return self._moved(memory, t, values)
 
     def _moved(self, last: Turning, t, values) -> tuple[Turning, dict[str, Any]]:
         """How the car turns after this row, and the row at the centre of gravity."""
@@ -140,22 +122,6 @@ class AtCentre(AbstractMethod):
         return {"course": course - swings, "speed": speed + turns * self.antenna_y}
 
 
-class SmoothableAtCentre(AtCentre, AbstractSmoothable):
-    """`AtCentre` of a method that can be smoothed."""
-
-    inner: AbstractSmoothable
-
-    def _memory(self, inner, turning):
-        return MovedMemory(inner, turning, inner.belief)
-
-    def ahead(self, memory, t, values) -> Belief:
-        _, moved = self._moved(memory.turning, t, values)
-        return self.inner.ahead(memory.inner._replace(belief=memory.belief), t, moved)
-
-    def say(self, memory) -> Answer:
-        return self.inner.say(memory.inner._replace(belief=memory.belief))
-
-
 def method_at_centre(method: Any, car: CarSpecification) -> Any:
     """The method of a car whose inertial unit and antenna are at the file's `sensor_position` and `antenna_position`; the method
     itself where they are at the centre of gravity, where it knows their places, or reads nothing that depends on them."""
@@ -167,6 +133,5 @@ def method_at_centre(method: Any, car: CarSpecification) -> Any:
     places = [coordinate for place in (unit, antenna) for coordinate in (place or (0.0, 0.0))[:2]]
     if method.knows_places or not any(places):
         return method
-    kind = SmoothableAtCentre if isinstance(method, AbstractSmoothable) else AtCentre
     named = dict(zip(("unit_x", "unit_y", "antenna_x", "antenna_y"), places, strict=True))
-    return kind(method, **named, lag=satellite_lag(car))
+    return prepared(method, AtCentre(**named, lag=satellite_lag(car), over_ground="course" in reads))

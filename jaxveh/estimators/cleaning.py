@@ -15,7 +15,8 @@ from jaxveh._core.parameter import positive
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.contract import Need, check_needs
 from jaxveh.estimators.live import AbstractCleaning, clean_recording
-from jaxveh.estimators.rear_axle import CHANNEL, USUAL_WHEELBASE, rolling_below
+from jaxveh.estimators.rear_axle import CHANNEL, STEERED, USUAL_WHEELBASE, rolling_below
+from jaxveh.estimators.rear_steer import CHANNEL as STEER_REAR
 from jaxveh.sensors import LowPass
 
 A_X_CUTOFF = 1.6
@@ -69,8 +70,8 @@ class Watched(NamedTuple):
 
 
 class RearAxleMemory(NamedTuple):
-    """The row before: time (s), speed, a_x; the states of the low-passes; the records of the measured channels; and the
-    low-passes of the integrals of a_y and v_x yaw_rate, less the integrals (m/s)."""
+    """The row before: time (s), speed, a_x; the states of the low-passes; the records of the measured channels; the low-passes of
+    the integrals of a_y and v_x yaw_rate, less the integrals (m/s); the angle of steered rear wheels (rad) and its low-pass."""
 
     t: Any
     v_x: Any
@@ -83,6 +84,7 @@ class RearAxleMemory(NamedTuple):
     a_y_behind: Any
     turning_behind: Any
     felt: Any
+    steer: Any = None
 
 
 class RearAxleCleaning(AbstractCleaning):
@@ -90,17 +92,19 @@ class RearAxleCleaning(AbstractCleaning):
 
     Spikes and stuck samples count as missing, and missing a_y and yaw_rate are held for a while. a_x is low-passed (first order);
     a_y and yaw_rate are used raw for the integral and low-passed (second order) for the force. The growth of the integral since
-    the low-passed rows is added to the balance, so that the low-pass causes no delay. `wheelbase` (m).
+    the low-passed rows is added to the balance, so that the low-pass causes no delay. `wheelbase` (m). `rear_steer`: the rows
+    have the angle of steered rear wheels, as `RearSteer` prepares them.
     """
 
     wheelbase: jax.Array = positive("m", default=USUAL_WHEELBASE)
+    rear_steer: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
         check_positive("RearAxleCleaning.wheelbase", self.wheelbase, "m")
 
     @property
     def channels(self):
-        return tuple(need.channel for need in BLIND)
+        return (*(need.channel for need in BLIND), *((STEER_REAR,) if self.rear_steer else ()))
 
     @property
     def inputs(self):
@@ -120,9 +124,11 @@ class RearAxleCleaning(AbstractCleaning):
         felt = (a_y, v_x * yaw_rate)
         a_y_behind, turning_behind = (behind(rate) for rate in felt)
         memory = RearAxleMemory(
-            t, v_x, values["a_x"], slow, smooth[0], smooth[1], watched[0], watched[1], a_y_behind, turning_behind, felt
-        )
-        return memory, self._row(memory, none, jnp.isnan(raw), ~jnp.isnan(values["a_y"]), v_x, a_y, yaw_rate)
+            t, v_x, values["a_x"], slow, smooth[0], smooth[1], watched[0], watched[1], a_y_behind, turning_behind, felt,
+            self._steer(None, values, none),
+        )  # fmt: skip
+        row = self._row(memory, none, jnp.isnan(raw), ~jnp.isnan(values["a_y"]), v_x, a_y, yaw_rate)
+        return memory, row | self._steered(memory)
 
     def next(self, memory, t, values):
         dt, v_x = t - memory.t, values["v_x"]
@@ -149,8 +155,20 @@ class RearAxleCleaning(AbstractCleaning):
             a_y, yaw_rate,
             _behind(one, memory.a_y_behind, a_y_before, dt), _behind(one, memory.turning_behind, turning_before, dt),
             (push, v_x * rate),
+            self._steer(memory.steer, values, dt),
         )  # fmt: skip
-        return after, self._row(after, dt, lost, felt, v_x, push, rate)
+        return after, self._row(after, dt, lost, felt, v_x, push, rate) | self._steered(after)
+
+    def _steer(self, before, values, dt) -> tuple[Any, Any] | None:
+        """The angle of the rear wheels and its low-pass after a row; `before`: after the row before."""
+        if not self.rear_steer:
+            return None
+        angle, low_pass = values[STEER_REAR], self._low_pass(values["v_x"])
+        return angle, low_pass.start(angle) if before is None else low_pass.step(before[1], before[0], angle, dt)
+
+    def _steered(self, memory) -> dict[str, Any]:
+        """The inputs `rear_axle.STEERED`."""
+        return dict(zip(STEERED, (memory.steer[0], memory.steer[1][0]), strict=True)) if self.rear_steer else {}
 
     def _row(self, memory, dt, lost, felt, v_x, a_y, yaw_rate):
         low_pass = self._low_pass(v_x)
@@ -240,7 +258,7 @@ def _watch(before: Watched, t, value, moves, step: float, rate: float, most: flo
     return jnp.where(good, value, jnp.nan), after
 
 
-def clean(recording: Recording, cleaning: RearAxleCleaning | None = None) -> Recording:
+def clean(recording: Recording, cleaning: AbstractCleaning | None = None) -> Recording:
     """Clean a log as the filter of sideslip reads it: see `RearAxleCleaning`.
 
     **Raises** `InputError` where a channel is missing, or a speed is NaN (fill it first with `recording.fill`).

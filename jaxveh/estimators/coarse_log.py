@@ -13,7 +13,8 @@ import numpy as np
 from jaxveh._core.lengths import common_length
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.cleaning import without_wild_values
-from jaxveh.estimators.rear_axle import CHANNEL, INPUTS, USUAL_WHEELBASE, rolling_below
+from jaxveh.estimators.rear_axle import CHANNEL, INPUTS, STEERED, USUAL_WHEELBASE, rolling_below
+from jaxveh.estimators.rear_steer import CHANNEL as STEER_REAR
 
 CUTOFF = 0.7
 """Hz, for a car of the usual wheelbase: the -3 dB frequency of the smoothing."""
@@ -64,6 +65,8 @@ def coarse(recording: Recording, wheelbase: float) -> Recording:
         "a_y_lead": none, "turning_lead": none, "lag": none, "step": none + stride * step, "felt": near[at] + none,
         CHANNEL: np.where(counted, 0.0, np.nan),
     }  # fmt: skip
+    if STEER_REAR in recording:
+        rows |= dict.fromkeys(STEERED, smooth(_bridged(recording, STEER_REAR, time))[at])
     if "v_y" in recording:
         rows["v_y"] = _reference(recording, time, step, quick)[at]
     return _filled_up(Recording(time[at], rows), common_length(-(-len(at) // ROWS) * ROWS))
@@ -119,7 +122,7 @@ def _filled_up(recording: Recording, count: int) -> Recording:
     time, step = np.asarray(recording.time), float(recording.time[1] - recording.time[0])
     last = {name: np.asarray(recording[name]) for name in recording.names}
     rows = {
-        name: np.append(values, np.full(extra, values[-1] if name in INPUTS else np.nan))
+        name: np.append(values, np.full(extra, values[-1] if name in INPUTS + STEERED else np.nan))
         for name, values in last.items()
     }
     return Recording(np.append(time, time[-1] + step * np.arange(1, extra + 1)), rows)

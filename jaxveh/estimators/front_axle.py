@@ -9,6 +9,7 @@ import numpy as np
 
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.coarse_log import coarse
+from jaxveh.estimators.rear_steer import with_rear_angle
 from jaxveh.filters import Extended, smooth
 from jaxveh.statespace import StateSpace
 
@@ -47,7 +48,7 @@ def front_axle(model: StateSpace, recordings: Sequence[Recording]) -> FrontAxle 
 def _seen(model: StateSpace, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Slip angles (rad) and forces (N) of the front axle in the rows that count."""
     s = model.system
-    log = coarse(recording, float(s.wheelbase))
+    log = coarse(with_rear_angle("sideslip", s.rear_steer, recording), float(s.wheelbase))
     found = smooth(Extended(), model, log.select([*model.inputs, *model.channels]))
     rows = model.rows(log)
     share, rear = (np.asarray(one) for one in s.shares(rows.u))

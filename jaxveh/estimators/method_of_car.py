@@ -19,11 +19,13 @@ TURNING = ("steer", "steering_wheel", "steering_torque", "yaw_rate", "a_y")
 @dataclass(frozen=True)
 class MethodOfCar:
     """How to make a method from a car's file (`of_centre`, for measurements of the centre of gravity; it **raises** `InputError`
-    for a key missing from the file), its description in one line, and its source."""
+    for a key missing from the file), its description in one line, its source, and whether it also holds for a car with steered
+    rear wheels (`any_steering`): `of_centre` then makes it with `rear_steer.with_rear_steer`, or no axle is part of it."""
 
     of_centre: Callable[[CarSpecification], AbstractMethod]
     help: str
     source: str
+    any_steering: bool = False
 
     def make(self, car: CarSpecification) -> AbstractMethod:
         """The method for a car's file, whose inertial unit and antenna may be elsewhere (`at_centre.AtCentre`)."""
@@ -32,8 +34,8 @@ class MethodOfCar:
 
 def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: str) -> AbstractMethod:
     """The method of a name for a car's file, or the source itself if it is a method. **Raises** `InputError` for an unknown
-    name, for methods that are no `MethodOfCar` or make none, and for a car with steered rear wheels unless the method reads no
-    channel of `TURNING`."""
+    name, for methods that are no `MethodOfCar` or make none, and for a car with steered rear wheels unless the method holds for
+    it or reads no channel of `TURNING`."""
     if isinstance(source, AbstractMethod):
         return source
     check_one_of(f"{who}: method", name, methods)
@@ -43,8 +45,10 @@ def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: s
         )
     entry, place = methods[name], f"{who}: METHODS[{name!r}]"
     check_kind(place, entry, MethodOfCar, "Such as MethodOfCar(lambda car: Mine(), 'what it is', 'its source').")
-    method = entry.of_centre(source.with_front_steering())
+    method = entry.of_centre(source if entry.any_steering else source.with_front_steering())
     check_kind(f"{place}.make(car)", method, AbstractMethod, "Derive it from estimators.AbstractMethod.")
-    if any(need.channel in TURNING for need in method.needs):
-        io.check_front_steered(source, f"{who}: {name}")
+    if not entry.any_steering and any(need.channel in TURNING for need in method.needs):
+        others = [f'"{other}"' for other, one in methods.items() if one.any_steering]
+        advice = f"Take the method {' or '.join(others)}, which includes those angles. " if others else ""
+        io.check_front_steered(source, f"{who}: {name}", advice)
     return method_at_centre(method, source)

@@ -28,6 +28,7 @@ from jaxveh.estimators.drive_force import AbstractDriveForce
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractSmoothable, answer
 from jaxveh.estimators.misfit import Misfit, Roughness, learn_roughness, no_misfit, no_roughness
+from jaxveh.estimators.rear_steer import rear_angle, rolls_across
 from jaxveh.estimators.sequential import Belief, Measurement, belief_of, correct_by_each, move, spread_of
 from jaxveh.estimators.sliding import Sliding, indications_of_sliding
 from jaxveh.io import CarSpecification
@@ -199,9 +200,9 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
         return (heard["a_x"] - x.a_x_bias) / (1.0 + GRAVITY * self.pitch_gradient)
 
     def _rolls_across(self, v_x, heard):
-        """Lateral speed of a rear axle that does not slide, m/s."""
+        """Lateral speed of the centre of gravity if the rear axle does not slide, m/s."""
         slip = self.rear_compliance * heard["a_y"] * (v_x / away_from_zero(v_x))
-        return self.rear_axle_to_cg * heard["yaw_rate"] - v_x * slip
+        return self.rear_axle_to_cg * heard["yaw_rate"] + rolls_across(heard, v_x) - v_x * slip
 
     def _speeds_up(self, x, heard):
         v_y = self._rolls_across(x.v_x, heard)
@@ -253,9 +254,10 @@ class Pulling(AbstractSmoothable, AbstractDriveForce):
         return Measurement(residual, jnp.square(self.climb_noise), there, 3.0)
 
     def _forces(self, v_x, torques: Torques, slides, heard) -> Measurement:
-        """The balance of forces: the specific force less that of torques, rolling, air and the steered front wheels."""
+        """The balance of forces: the specific force less that of torques, rolling, air and the steered wheels."""
+        # The front wheels are turned by this much more than the rear ones.
         steer = self.wheelbase * heard["yaw_rate"] / away_from_zero(v_x)
-        turning = heard["a_y"] * self.rear_axle_to_cg / self.wheelbase * steer
+        turning = heard["a_y"] * (self.rear_axle_to_cg / self.wheelbase * steer + rear_angle(heard))
         size = self.wheel_radius * self.mass
         slowing = torques.brake / size
 

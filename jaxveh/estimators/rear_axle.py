@@ -13,6 +13,7 @@ from jaxveh._core.bijectors import Interval
 from jaxveh._core.errors import check_kind
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.rear_steer import RearSteer
 from jaxveh.estimators.two_axles import AbstractTwoAxles
 from jaxveh.statespace import Continuous, Gaussian, Prior, StateDependent, StateSpace
 from jaxveh.vehicles import GRAVITY
@@ -72,7 +73,7 @@ class RearAxleReport(NamedTuple):
 
 
 class RearAxle(AbstractTwoAxles):
-    """A car reduced to the rear axle, for estimating sideslip; it needs neither steer nor any front axle parameter.
+    """A car reduced to the rear axle, for estimating sideslip; it needs no steer of front wheels, nor any front axle parameter.
 
     - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m).
     - `stiffness` (1/rad): cornering stiffness over load; `grip` (-): largest lateral force over load; `shape` (-): how sharply
@@ -88,6 +89,7 @@ class RearAxle(AbstractTwoAxles):
     - `heading_offset` (rad): the angle of a sideslip reference (an INS) against the car; does not affect the states.
     - `bank` (rad), `slip_error` (rad): standard deviations of the states of these names, first-order Gauss-Markov with
       correlation times `bank_time` and `slip_time` (s).
+    - `rear_steer`: how the rear wheels are steered, None where they are not.
     - `force_noise` (sqrt s), `slip_noise` (rad sqrt s): densities of white noise, of the force over load and of the slip angle.
 
     Inputs: see `INPUTS`. Axes of ISO 8855; a positive slip angle gives a positive lateral force.
@@ -117,6 +119,7 @@ class RearAxle(AbstractTwoAxles):
     slip_noise: jax.Array = positive("rad s^0.5", default=0.001)
     bank_time: jax.Array = positive("s", default=15.0)
     slip_time: jax.Array = positive("s", default=2.0)
+    rear_steer: RearSteer | None = None
 
     def shares(self, u) -> tuple[Any, Any]:
         """Lateral force over load of the front axle and of the rear axle, from the sensors: ISO 8855 signs."""
@@ -140,9 +143,11 @@ class RearAxle(AbstractTwoAxles):
         """Lateral acceleration less gravity's share, m/s^2, on the car's centre line level with the accelerometer."""
         return (a_y - self.a_y_offset) / self.a_y_gain + self.sensor_y * yaw_rate**2
 
-    def rolls(self, yaw_rate) -> Any:
-        """v_y of the accelerometer if the rear axle rolls without slip, m/s."""
-        return (self.rear_axle_to_cg + self.sensor_x) * (yaw_rate - self.yaw_rate_offset)
+    def slides(self, u, yaw_rate, steer, slip_angle=0.0) -> Any:
+        """v_y of the accelerometer if the rear axle, whose wheels are turned by `steer` (rad), has this slip angle, m/s; without
+        one it rolls."""
+        behind = (self.rear_axle_to_cg + self.sensor_x) * (yaw_rate - self.yaw_rate_offset)
+        return behind - u.v_x * numerics.tan(slip_angle - steer)
 
     def v_y_now(self, x: RearAxleState, u) -> Any:
         """v_y of the accelerometer, m/s. The state is the integral of an a_y that is late by `a_y_delay_error`."""
@@ -182,10 +187,11 @@ def transition(system: RearAxle, t0, t1, x: RearAxleState, u) -> RearAxleState:
     dt = t1 - t0
     felt = system.specific_force(u.a_y, u.yaw_rate) - (u.turning - u.v_x * system.yaw_rate_offset)
     moving = x.v_y + dt * (felt - GRAVITY * system.bank * x.bank)
-    rolling = numerics.as_wide_as(system.rolls(u.yaw_rate), x.v_y)
+    rolling = numerics.as_wide_as(system.slides(u, u.yaw_rate, steer_of(u)), x.v_y)
     fade = lambda time: jnp.exp(-dt / time)
     slip_error = fade(system.slip_time) * x.slip_error
-    steady = rolling - u.v_x * (numerics.tan(system.slip_angle(x, u)[0]) + system.slip_error * slip_error)
+    sliding = system.slides(u, u.yaw_rate, steer_of(u), system.slip_angle(x, u)[0])
+    steady = sliding - u.v_x * system.slip_error * slip_error
     v_y = jnp.where((u.felt > 0) & (dt < LONGEST_STEP), moving, steady)
     return RearAxleState(
         v_y=jnp.where(u.v_x >= rolling_below(system.wheelbase), v_y, rolling),
@@ -213,7 +219,7 @@ def observation(system: RearAxle, t, x: RearAxleState, u):
     added."""
     del t
     angle, _ = system.slip_angle(x, u)
-    then = system.rolls(u.yaw_rate_smooth) - u.v_x * numerics.tan(angle)
+    then = system.slides(u, u.yaw_rate_smooth, steer_of(u, "steer_rear_smooth"), angle)
     steady = system.a_y_offset / system.a_y_gain - u.v_x * system.yaw_rate_offset + GRAVITY * system.bank * x.bank
     since = u.a_y_lead / system.a_y_gain - u.turning_lead - u.lag * steady
     return record_type("Measurements", (CHANNEL,))(
@@ -243,7 +249,7 @@ def report(system: RearAxle, t, x: RearAxleState, u) -> RearAxleReport:
     return RearAxleReport(
         v_y=v_y,
         sideslip=sideslip,
-        slip_angle_rear=-numerics.arctan2(at_rear, u.v_x + like),
+        slip_angle_rear=steer_of(u) - numerics.arctan2(at_rear, u.v_x + like),
         F_yf=F_f * front + like,
         F_yr=F_r * rear + like,
         bank=system.bank * x.bank,
@@ -269,6 +275,15 @@ INPUTS = (
 """
 
 
+STEERED = ("steer_rear", "steer_rear_smooth")
+"""Further inputs of a car with steered rear wheels: their angle, and the same through the low-pass of the axle's force, rad."""
+
+
+def steer_of(u: Any, name: str = "steer_rear") -> Any:
+    """The angle of the rear wheels among the inputs, rad; 0 where they are not steered."""
+    return getattr(u, name, 0.0)
+
+
 def rear_axle_model(system: RearAxle) -> StateSpace:
     """The state space for a real log, with initial noise levels for a fit (stated in the code, unit by unit)."""
     check_kind("system", system, RearAxle)
@@ -288,5 +303,5 @@ def rear_axle_model(system: RearAxle) -> StateSpace:
             RearAxleState(0.0, 0.0, 0.0, 0.0),
             Gaussian({"v_y": 0.2, "bank": 1.0, "slip_error": 1.0, "stiffening": 0.001}),
         ),
-        inputs=INPUTS,
+        inputs=INPUTS if system.rear_steer is None else INPUTS + STEERED,
     )

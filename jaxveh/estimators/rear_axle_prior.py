@@ -7,8 +7,8 @@ from typing import Any
 from jaxveh._core.errors import InputError
 from jaxveh.estimators.car_file import lean_of
 from jaxveh.estimators.rear_axle import USUAL_WHEELBASE, RearAxle
+from jaxveh.estimators.rear_steer import rear_steer_of
 from jaxveh.io import CarSpecification
-from jaxveh.io import kit as io
 from jaxveh.sensors import LowPass
 from jaxveh.vehicles import GRAVITY
 
@@ -69,7 +69,6 @@ def car_of(car: CarSpecification | RearAxle) -> RearAxle:
     """The rear axle of a car's file without calibration; missing values are scaled with the car's size."""
     if isinstance(car, RearAxle):
         return car
-    io.check_front_steered(car, "sideslip")
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     load = car.mass * GRAVITY * a / (a + b)
     size = (a + b) / USUAL_WHEELBASE
@@ -93,6 +92,7 @@ def car_of(car: CarSpecification | RearAxle) -> RearAxle:
         mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=a, rear_axle_to_cg=b,
         cg_height=car.cg_height or CG_HEIGHT_SHARE * (a + b),
         stiffness=stiffness / load, grip=grip / load,
+        rear_steer=rear_steer_of(car),
         force_noise=0.01 * time**0.5, slip_noise=0.001 * time**0.5, bank_time=15.0 * time, slip_time=2.0 * time,
         **usual | {name: value for name, value in told.items() if value is not None},
     )  # fmt: skip

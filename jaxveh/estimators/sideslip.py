@@ -28,9 +28,11 @@ from jaxveh.estimators.live import Live
 from jaxveh.estimators.method import AbstractMethod, Answers, LiveMethod
 from jaxveh.estimators.method_of_car import method_of
 from jaxveh.estimators.parameter_bands import Members, estimate_with_members, members_of_fit, members_of_prior
-from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
+from jaxveh.estimators.prepared import Chained
+from jaxveh.estimators.rear_axle import STEERED, RearAxle, rear_axle_model
 from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
 from jaxveh.estimators.rear_axle_prior import SPREADS, car_of, chosen_parameters, unfitted_spreads
+from jaxveh.estimators.rear_steer import with_rear_angle
 from jaxveh.estimators.sideslip_methods import METHODS
 from jaxveh.estimators.sideslip_score import (
     at_centre,
@@ -99,10 +101,11 @@ def calibrate(
     """Fit the rear axle, noise levels and sensor offsets of a car to one span of a log or to several together, by the greatest
     posterior density of a filter.
 
-    A blind calibration (`uses=()`) reads only v_x, a_x, a_y and yaw_rate. With `uses=("v_y",)`, or `("sideslip",)`, that
-    channel is a reference for the fit. Its weight is chosen by fitting on the first half of each span and validating on the
-    second; no weight at all is among the choices, since a reference with slow errors of its own makes a car worse. Start
-    values and priors come from the car's file and `rear_axle_prior.SPREADS`; nothing outside the recordings is used.
+    A blind calibration (`uses=()`) reads only v_x, a_x, a_y and yaw_rate, and the angle of steered rear wheels. With
+    `uses=("v_y",)`, or `("sideslip",)`, that channel is a reference for the fit. Its weight is chosen by fitting on the first
+    half of each span and validating on the second; no weight at all is among the choices, since a reference with slow errors of
+    its own makes a car worse. Start values and priors come from the car's file and `rear_axle_prior.SPREADS`; nothing outside
+    the recordings is used.
     `validation` of the result is the sideslip RMSE in degrees on the second halves by the reference's weight (rad), for fits
     on the first halves.
 
@@ -130,7 +133,8 @@ def _fit(
 ) -> Calibration:  # fmt: skip
     """The calibration that `calibrate` returns, with options of `model`."""
     start = model(car, **options)
-    seen = [on_time(_seen(one, uses), start.system) for one in recordings]
+    steered = [with_rear_angle(NAME, start.system.rear_steer, one) for one in recordings]
+    seen = [on_time(_seen(one, uses), start.system) for one in steered]
     seen = [at_centre(car, one) for one in seen] if uses else seen
     logs = coarse_logs(seen, _wheelbase(start))
     stood = offsets_at_standstill(seen, _wheelbase(start))
@@ -175,7 +179,8 @@ def _seen(recording: Recording, uses: tuple[str, ...]) -> Recording:
     if "sideslip" in uses:
         recording = recording.replace(v_y=np.asarray(recording["v_x"]) * np.tan(np.asarray(recording["sideslip"])))
         uses = ("v_y",)
-    return recording.select([name for name in (*[need.channel for need in needs], *uses) if name in recording])
+    wanted = (*[need.channel for need in needs], STEERED[0], *uses)
+    return recording.select([name for name in wanted if name in recording])
 
 
 def _wheelbase(model: StateSpace) -> Any:
@@ -244,7 +249,8 @@ def estimate(
     smoothed: bool = True,
     method: str | None = None,
 ) -> Estimate | SmoothedEstimate | Answers:
-    """Sideslip of the car along a log from v_x, a_x, a_y and yaw_rate: see `rear_axle.RearAxleReport` for the names.
+    """Sideslip of the car along a log from v_x, a_x, a_y and yaw_rate, and the angle of the rear wheels if the car's file says
+    that they are steered: see `rear_axle.RearAxleReport` for the names.
 
     `source`: a `Calibration`, a model, or a car's file without calibration. Every row is estimated from all rows (a
     smoother). With `smoothed=False`, and for filters without a Gaussian smoother, it is estimated from the rows up to it, as
@@ -264,9 +270,10 @@ def estimate(
     check_needs(NAME, needs, recording)
     _check_one_clock(recording)
     one = model_of(NAME, source, model)
+    recording = with_rear_angle(NAME, one.system.rear_steer, recording)
     if smoothed:
         recording = on_time(recording, one.system)
-    used, log = filter or Extended(), clean(recording, RearAxleCleaning(_wheelbase(one)))
+    used, log = filter or Extended(), clean(recording, _cleaning(one))
     gaussian = kit.smoothing_of(used) is Smoothing.gaussian
     members = _members(source, one) if gaussian else None
     if members is not None:
@@ -304,4 +311,10 @@ def live(
         return LiveMethod(method_of(NAME, METHODS, source, method or RECOMMENDED))
     one, used = model_of(NAME, source, model), filter or Extended()
     members = _members(source, one) if kit.smoothing_of(used) is Smoothing.gaussian else None
-    return Live(used, one, RearAxleCleaning(_wheelbase(one)), key, members)
+    rear_steer, cleaning = one.system.rear_steer, _cleaning(one)
+    return Live(used, one, cleaning if rear_steer is None else Chained(rear_steer, cleaning), key, members)
+
+
+def _cleaning(model: StateSpace) -> RearAxleCleaning:
+    """The cleaning of a log whose rows have the angle of the rear wheels, if they are steered."""
+    return RearAxleCleaning(_wheelbase(model), model.system.rear_steer is not None)

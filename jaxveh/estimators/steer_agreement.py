@@ -13,12 +13,10 @@ from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators.body_motion import SILENCE, hold, steer_heard
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import Lateral, lateral_of
+from jaxveh.estimators.rear_steer import rear_angle
 from jaxveh.io import CarSpecification
 
 STEER, STEERING_WHEEL = Need("steer", "rad", optional=True), Need("steering_wheel", "rad", optional=True)
-
-FRONT = (None, "front", "ackermann")
-"""Kinds of steering whose rear wheels point ahead."""
 
 PARKING, DRIVING = 4.0, 8.0
 """m/s: below the first speed steer and yaw rate disagree by the geometry of large angles, beyond the second by slip."""
@@ -35,9 +33,9 @@ class AgreementMemory(NamedTuple):
 
 
 class SteerAgreement(eqx.Module):
-    """How far a car is from the steady turn of linear tyres, in which `l r / v_x = steer - understeer f_y` whatever the bank
-    (`Lateral.steady_steer`; H. E. Tseng, Vehicle System Dynamics 36, 2001): an axle that slides has another slip angle than
-    that of its force.
+    """How far a car is from the steady turn of linear tyres, in which `l r / v_x = steer - steer_rear - understeer f_y` whatever
+    the bank (`Lateral.steady_steer`; H. E. Tseng, Vehicle System Dynamics 36, 2001): an axle that slides has another slip angle
+    than that of its force.
 
     The disagreement through a low-pass of `time` (s), over `usual` (rad). What it was fades within `staying` (s): an axle that
     grips again needs a moment. At the speeds of parking, and where the steer is missing, nothing is said. A car that slides on
@@ -73,7 +71,11 @@ class SteerAgreement(eqx.Module):
         measured = steer_heard(values, self.ratio, self.offset)
         steer = hold(measured, last.steer)
         silence = jnp.where(jnp.isnan(measured), last.silence + dt, 0.0)
-        off = steer - self.car.steady_steer(v_x, heard["yaw_rate"], self.car.plane_force(heard["a_y"]))
+        off = (
+            steer
+            - rear_angle(heard)
+            - self.car.steady_steer(v_x, heard["yaw_rate"], self.car.plane_force(heard["a_y"]))
+        )
         told = jnp.where(silence < SILENCE, numerics.smooth_step((jnp.abs(v_x) - PARKING) / (DRIVING - PARKING)), 0.0)
         slow = last.slow + dt / (self.time + dt) * (told * off - last.slow)
         doubt = jnp.maximum(jnp.abs(slow) / self.usual, last.doubt * jnp.exp(-dt / self.staying))
@@ -81,8 +83,8 @@ class SteerAgreement(eqx.Module):
 
 
 def agreement_of(car: CarSpecification, who: str) -> SteerAgreement | None:
-    """Makes `SteerAgreement` from a car's file; None for a file without the front axle's stiffness, or with steered rear wheels.
-    **Raises** as `lateral_of`."""
-    if car.front_cornering_stiffness is None or car.steering not in FRONT:
+    """Makes `SteerAgreement` from a car's file; None for a file without the front axle's stiffness. **Raises** as
+    `lateral_of`."""
+    if car.front_cornering_stiffness is None:
         return None
     return SteerAgreement(lateral_of(car, who), ratio=car.steering_ratio, offset=car.steer_offset or 0.0)

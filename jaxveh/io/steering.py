@@ -20,11 +20,12 @@ def with_road_steer(car: CarSpecification, recording: Recording) -> Recording:
     return recording.replace(steer=np.asarray(recording["steering_wheel"]) / car.steering_ratio)
 
 
-def check_front_steered(car: CarSpecification, who: str) -> None:
-    """Raise `InputError` if the rear wheels of `car` are steered, because the equations of `who` do not include that."""
+def check_front_steered(car: CarSpecification, who: str, advice: str = "") -> None:
+    """Raise `InputError`, with more `advice`, if the rear wheels of `car` are steered, because the equations of `who` do not
+    include that."""
     if not car.steers_front_alone:
         raise InputError(
             f'{who}: the car\'s file has steering = "{car.steering}", but the equations used here hold only for a car with '
-            "front steering. Make the vehicle (vehicles.specified_car) and a filter for it (estimators.state_space), which "
-            "include the angles of the rear wheels, or leave the steering out of the file if the rear wheels stay straight."
+            f"front steering. {advice}Make the vehicle (vehicles.specified_car) and a filter for it (estimators.state_space), "
+            "which include the angles of the rear wheels, or leave the steering out of the file if the rear wheels stay straight."
         )

@@ -16,7 +16,13 @@ from jaxveh.vehicles.shared import (
     AbstractTwoAxle,
 )
 from jaxveh.vehicles.small_size import small_size
-from jaxveh.vehicles.steering import STEER_UNITS, STEERINGS, AbstractSteeredByRoadWheels, axle_angles
+from jaxveh.vehicles.steering import (
+    STEER_UNITS,
+    STEERINGS,
+    AbstractSteeredByRoadWheels,
+    axle_angles,
+    steering_of,
+)
 from jaxveh.vehicles.traction import AbstractSpinless
 from jaxveh.vehicles.two_track import AbstractLoadedTwoTrack, AbstractTwoTrack, air_drag, rolling_wheels
 from jaxveh.vehicles.upright_body import AbstractUprightTwoTrack
@@ -62,6 +68,7 @@ __all__ = [
     "planar_loads",
     "rolling_wheels",
     "small_size",
+    "steering_of",
     "travel_direction",
     "wheel_names",
     "wheels_of",

@@ -12,6 +12,7 @@ from jaxveh.estimators.bank.tseng import tseng_of
 from jaxveh.estimators.leaning import leaning_filter
 from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
+from jaxveh.estimators.rear_steer import with_rear_steer
 
 NAME = "bank"
 
@@ -34,9 +35,10 @@ METHODS = {
         "3.1.2.3 [123]",
     ),
     "filter": MethodOfCar(
-        lambda car: leaning_filter(car, NAME),
+        lambda car: with_rear_steer(leaning_filter(car, NAME), car),
         "one Kalman filter of bank, roll and the sensors' offsets; uses satellite course and roll gyroscope if available",
         "3.1.2.3, 1.3.2 [46]",
+        any_steering=True,
     ),
 }
 

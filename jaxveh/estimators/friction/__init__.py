@@ -23,6 +23,7 @@ from jaxveh.estimators.friction.stiffness_doubt import with_doubt
 from jaxveh.estimators.friction.wheels import Reconstruction, SlipSlope, WheelSlips
 from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.quantity import constant_of, estimate_of, live_of
+from jaxveh.estimators.rear_steer import with_rear_steer
 from jaxveh.io import CarSpecification
 from jaxveh.tyres import LuGre
 
@@ -76,10 +77,11 @@ def _lugre(car: CarSpecification) -> WheelObserver:
 
 METHODS = {
     "bank": MethodOfCar(
-        _bank,
+        lambda car: with_rear_steer(_bank(car), car),
         "one filter of the lateral motion per friction, with wheel slips where the log has them; known only near the limit, and "
         "where the file's curve and the brush model's agree",
         "section 3.1.2.1, joint with reference [99]; interacting multiple models (Blom & Bar-Shalom 1988)",
+        any_steering=True,
     ),
     "lateral_curve": MethodOfCar(
         _lateral,

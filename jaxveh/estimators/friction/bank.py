@@ -184,7 +184,8 @@ class FrictionBank(AbstractMethod):
     def _forces(self, x, friction, told: Told):
         """Lateral forces of both axles (N) in the body's axes; longitudinal forces reduce the available friction."""
         x, car = State(*x), self.car
-        slips = car.slip_angles(told.steer - x.steer_error - x.steer_offset, told.v_x, x.v_y, x.yaw_rate)
+        steer = told.steer - x.steer_error - x.steer_offset
+        slips = car.slip_angles(steer, told.v_x, x.v_y, x.yaw_rate, told.steer_rear)
         loads = car.load_ratios(told.a_x)
         share = jnp.where(told.a_x < 0.0, car.front_brake, car.front_drive)
         forces = []

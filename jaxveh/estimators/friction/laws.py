@@ -96,10 +96,11 @@ class PlanarCar(AbstractAxleForces):
         least = lambda ratio: jnp.maximum(ratio, 0.1)
         return least(1.0 - moved / self.rear_axle_to_cg), least(1.0 + moved / self.front_axle_to_cg)
 
-    def slip_angles(self, steer, v_x, v_y, yaw_rate):
-        """Slip angles of both axles, rad, with the measured `steer`; `v_x` (m/s) well above zero."""
+    def slip_angles(self, steer, v_x, v_y, yaw_rate, steer_rear=0.0):
+        """Slip angles of both axles, rad, with the measured `steer` and the angle `steer_rear` of the rear wheels; `v_x` (m/s)
+        well above zero."""
         front = steer - self.steer_offset - numerics.arctan((v_y + self.front_axle_to_cg * yaw_rate) / v_x)
-        return front, -numerics.arctan((v_y - self.rear_axle_to_cg * yaw_rate) / v_x)
+        return front, steer_rear - numerics.arctan((v_y - self.rear_axle_to_cg * yaw_rate) / v_x)
 
 
 def planar_car(car: CarSpecification) -> PlanarCar:

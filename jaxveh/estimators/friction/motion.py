@@ -6,13 +6,15 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
+from jaxveh.estimators.rear_steer import rear_angle
 from jaxveh.estimators.two_axles import LONGEST, LOWEST
 
 
 class Told(NamedTuple):
     """The last row: its time `t` (s), `v_x` (m/s, never below `LOWEST`), `steer` (rad) with the delay of the inertial sensors,
     `a_x` (m/s^2), the ages (s) of speed, steer and inertial sensors, and whether the car `moves`: speed, steer and inertial
-    sensors have recent measurements, and the speed is at least `LOWEST`. `raw_v_x` and `raw_steer` are the last measurements."""
+    sensors have recent measurements, and the speed is at least `LOWEST`. `raw_v_x` and `raw_steer` are the last measurements;
+    `steer_rear` (rad) is the angle of steered rear wheels."""
 
     t: Any
     v_x: Any
@@ -24,12 +26,13 @@ class Told(NamedTuple):
     steer_age: Any
     inertial_age: Any
     moves: Any
+    steer_rear: Any
 
 
 def start_told(t, values, late) -> Told:
     """The motion after the first row; `late` as in `next_told`."""
     zero, old = jnp.zeros_like(t), jnp.full_like(t, 1e3)
-    start = Told(t, zero + LOWEST, zero, zero, zero, zero, old, old, old, jnp.asarray(False))
+    start = Told(t, zero + LOWEST, zero, zero, zero, zero, old, old, old, jnp.asarray(False), zero)
     return next_told(start, t, values, late)
 
 
@@ -46,7 +49,8 @@ def next_told(last: Told, t, values, late) -> Told:
     delayed = last.steer + (raw_steer - last.steer) * (1.0 - jnp.exp(-dt / late))
     steer = jnp.where(last.steer_age > LONGEST, raw_steer, delayed)
     moves = fresh & (v_x >= LOWEST)
-    return Told(t, jnp.maximum(v_x, LOWEST), steer, a_x, v_x, raw_steer, speed_age, steer_age, inertial_age, moves)
+    at_least, rear = jnp.maximum(v_x, LOWEST), jnp.zeros_like(t) + rear_angle(values)
+    return Told(t, at_least, steer, a_x, v_x, raw_steer, speed_age, steer_age, inertial_age, moves, rear)
 
 
 def _held(value, last, age, dt):

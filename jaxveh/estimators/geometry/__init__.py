@@ -11,6 +11,7 @@ from jaxveh.estimators.geometry.learned import Learned, numbers_learned, read_le
 from jaxveh.estimators.geometry.learner import UNITS, learner_of
 from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.quantity import constant_of, estimate_of, live_of
+from jaxveh.estimators.rear_steer import with_rear_steer
 
 NAME = "geometry"
 
@@ -18,9 +19,10 @@ SHOWN = dict(UNITS)
 
 METHODS = {
     "learner": MethodOfCar(
-        lambda car: learner_of(car, NAME),
+        lambda car: with_rear_steer(learner_of(car, NAME), car),
         "least squares of steer against yaw rate and of yaw moments, with flags for the parameters that a drive determines",
         "3.1.2.4, eq 17 [133]",
+        any_steering=True,
     ),
 }
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_flags, check_positive, path_of
 from jaxveh._core.version import VERSION
-from jaxveh.estimators.at_centre import AtCentre
 from jaxveh.estimators.geometry.learner import RELATIVE, UNITS, Learner
+from jaxveh.estimators.prepared import Prepared
 from jaxveh.io import kit
 
 KEYS = ("value", "std", "unit", "valid")
@@ -64,12 +64,12 @@ def numbers_learned(said: Any) -> Learned:
     )
 
 
-def start_from(method: Learner | AtCentre, learned: Learned) -> Learner | AtCentre:
+def start_from(method: Learner | Prepared, learned: Learned) -> Learner | Prepared:
     """The learner that starts where another drive ended: with the values and standard deviations of the `valid` entries.
 
     The standard deviations grow by a fifth from drive to drive, so that changes of the car are learned.
     """
-    if isinstance(method, AtCentre):
+    if isinstance(method, Prepared):
         return dataclasses.replace(method, inner=start_from(method.inner, learned))
     changes: dict[str, Any] = {}
     for name, entry in learned.entries.items():

@@ -15,6 +15,7 @@ from jaxveh.estimators.car_file import number_of
 from jaxveh.estimators.delays import unit_delay
 from jaxveh.estimators.leaning import Leaning, leaning_filter
 from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.rear_steer import rear_angle
 from jaxveh.estimators.sequential import Belief, Measurement, belief_of, correct
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
@@ -61,15 +62,16 @@ STAYS = 10.0
 
 class LearnerMemory(NamedTuple):
     """The memory of the filter of roll and bank, `leaning`; the steering `wheel` angle (rad); the steer with the delay of the yaw
-    rate, `late` (rad); the mean `square` of the steer without slip (rad^2); low-passed steer (rad), yaw rate (rad/s), lateral
-    force over mass (m/s^2) and lateral velocity (m/s); the two fits; the reported values, `shown`; the time since the first row,
-    `age` (s)."""
+    rate, `late` (rad); the mean `square` of the steer without slip (rad^2); low-passed steer and angle of the rear wheels, `rear`
+    (rad), yaw rate (rad/s), lateral force over mass (m/s^2) and lateral velocity (m/s); the two fits; the reported values,
+    `shown`; the time since the first row, `age` (s)."""
 
     leaning: Any
     wheel: Any
     late: Any
     square: Any
     steer: Any
+    rear: Any
     turn: Any
     force: Any
     v_y: Any
@@ -84,7 +86,7 @@ class Learner(AbstractMethod):
 
     In turns of little lateral acceleration, with yaw rate and roll corrected by the filter `leaning`,
 
-        steering_wheel / ratio = offset + l r / v_x + understeer f_y + J_z (1 / C_f + 1 / C_r) / l dr/dt
+        steering_wheel / ratio = offset + steer_rear + l r / v_x + understeer f_y + J_z (1 / C_f + 1 / C_r) / l dr/dt
 
     gives ratio, offset and understeer. With known cornering stiffnesses understeer gives the position of the centre of gravity
     (eq 17 of the review, corrected: `l r / v - delta`): `l_f = l (m / C_f - understeer) / (m (1 / C_f + 1 / C_r))`.
@@ -135,7 +137,7 @@ class Learner(AbstractMethod):
         steering = belief_of(Steering, {"offset": self.steer_offset}, stds, t)
         turning = belief_of(Turning, {}, {"stiffness": self.stiffness_spread, "inertia": self.inertia_spread}, t)
         start = {name: getattr(self, name) + zero for name in UNITS}
-        memory = LearnerMemory(leaning, zero, zero, zero, zero, zero, zero, zero, steering, turning, start, zero)
+        memory = LearnerMemory(leaning, *[zero] * 8, steering, turning, start, zero)
         return self._next(memory, leaning, said, zero, values)
 
     def next(self, memory, t, values):
@@ -149,7 +151,8 @@ class Learner(AbstractMethod):
         there = ~silent & ~jnp.isnan(values["steering_wheel"]) & (memory.age > START) & (motion.v_x > SLOWEST)
         fast = away_from_zero(motion.v_x)
         wheel = hold(values["steering_wheel"], memory.wheel)
-        memory, rate = self._low_passed(memory._replace(leaning=leaning, wheel=wheel), said.mean, fast, dt)
+        heard = memory._replace(leaning=leaning, wheel=wheel)
+        memory, rate = self._low_passed(heard, rear_angle(values), said.mean, fast, dt)
         # Rows count gradually less in hard turns and at low speed.
         doubt = 1.0 + jnp.square(jnp.square(memory.force / LINEAR)) + jnp.square(jnp.square(QUICK / fast))
         lasting = doubt * 2.0 * self.lasting / jnp.maximum(dt, 1e-3)
@@ -168,19 +171,23 @@ class Learner(AbstractMethod):
         memory = memory._replace(steering=steering, turning=turning, shown=shown, age=memory.age + dt)
         return memory, answer(shown, stds, known)
 
-    def _low_passed(self, memory: LearnerMemory, believed: Any, fast: Any, dt: Any) -> tuple[LearnerMemory, Any]:
-        """The memory with the low-passed signals of this row, and the yaw acceleration (rad/s^2). `believed`: the means of the
-        filter of roll and bank; `fast`: the speed away from zero (m/s)."""
+    def _low_passed(
+        self, memory: LearnerMemory, rear: Any, believed: Any, fast: Any, dt: Any
+    ) -> tuple[LearnerMemory, Any]:
+        """The memory with the low-passed signals of this row, and the yaw acceleration (rad/s^2). `rear`: the angle of the rear
+        wheels (rad); `believed`: the means of the filter of roll and bank; `fast`: the speed away from zero (m/s)."""
         motion, share = memory.leaning.motion, dt / (self.time + dt)
         slow = lambda before, now: before + share * (now - before)
         turn_now = motion.yaw_rate - believed.yaw_rate_bias
         force_now = motion.a_y - believed.a_y_bias - GRAVITY * believed.body_roll
         late = memory.late + dt / (self.late + dt) * (memory.wheel / self.steering_ratio - memory.late)
         turn = slow(memory.turn, turn_now)
-        curve = self.wheelbase * turn / fast
+        rear = slow(memory.rear, rear)
+        curve = self.wheelbase * turn / fast + rear
         after = memory._replace(
             late=late,
             steer=slow(memory.steer, late),
+            rear=rear,
             turn=turn,
             force=slow(memory.force, force_now),
             v_y=slow(memory.v_y, believed.v_y),
@@ -191,7 +198,7 @@ class Learner(AbstractMethod):
     def _fit_steering(self, now: LearnerMemory, rate: Any, fast: Any, lasting: Any, there: Any) -> Belief:
         """The fit of ratio, offset and understeer after a row with these low-passed signals. `lasting`: the factor on a row's
         variance, since errors of neighbouring rows are alike (-); `there`: whether the row counts."""
-        curve = self.wheelbase * now.turn / fast
+        curve = self.wheelbase * now.turn / fast + now.rear
         start = self._understeer() * now.force - self.yaw_inertia * self._place_slope() / self.mass * rate
         off = lambda x: now.steer - x.offset - (1.0 + x.ratio) * (curve + start + x.understeer * now.force)
         calm = 1.0 + jnp.square(jnp.square(rate / CALM))

@@ -12,6 +12,7 @@ from jaxveh.estimators.joint import joint_filter
 from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.pulling import pulling_filter
 from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
+from jaxveh.estimators.rear_steer import with_rear_steer
 
 NAME = "grade"
 
@@ -35,9 +36,10 @@ METHODS = {
         "mass-grade-aukf",
     ),
     "filter": MethodOfCar(
-        lambda car: pulling_filter(car, NAME),
+        lambda car: with_rear_steer(pulling_filter(car, NAME), car),
         "kinematics with the accelerometer's offset as a state, which is observable if wheel torques are available",
         "3.1.2.3 [124, 127]",
+        any_steering=True,
     ),
 }
 

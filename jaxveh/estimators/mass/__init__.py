@@ -13,6 +13,7 @@ from jaxveh.estimators.mass.ratios import Gated, HighPass, KinematicGrade, ratio
 from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.pulling import pulling_filter
 from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
+from jaxveh.estimators.rear_steer import with_rear_steer
 
 NAME = "mass"
 
@@ -46,9 +47,10 @@ METHODS = {
         "mass-grade-aukf",
     ),
     "filter": MethodOfCar(
-        lambda car: pulling_filter(car, NAME),
+        lambda car: with_rear_steer(pulling_filter(car, NAME), car),
         "one filter of grade, mass and the accelerometer's offset, with bends, slip and a grade that changes with distance",
         "mass-grade-aukf [9, 10]",
+        any_steering=True,
     ),
 }
 

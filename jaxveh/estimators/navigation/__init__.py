@@ -22,23 +22,34 @@ SHOWN = {"v_x": "m/s", "v_y": "m/s", "yaw": "rad", "sideslip": "rad"}
 
 METHODS = {
     "kinematic": MethodOfCar(
-        navigation(Parts()), "inertial unit of three axes and satellites, no vehicle model", "section 1.3.2 [44, 45]"
+        navigation(Parts()),
+        "inertial unit of three axes and satellites, no vehicle model",
+        "section 1.3.2 [44, 45]",
+        any_steering=True,
     ),
     "six_axes": MethodOfCar(
-        navigation(Parts(three_more=True)), "with roll and pitch from six axes", "sections 1.1.2, 1.3.2 [48-50]"
+        navigation(Parts(three_more=True)),
+        "with roll and pitch from six axes",
+        "sections 1.1.2, 1.3.2 [48-50]",
+        any_steering=True,
     ),
     "two_antennas": MethodOfCar(
-        navigation(Parts(heading=True)), "with the heading from two antennas", "section 1.3.2 [52, 53]"
+        navigation(Parts(heading=True)),
+        "with the heading from two antennas",
+        "section 1.3.2 [52, 53]",
+        any_steering=True,
     ),
     "adapted_stiffness": MethodOfCar(
         navigation(Parts(wheels=True, axle="linear", adapts=True)),
         "with a linear rear axle whose stiffness is estimated from the satellites",
         "section 1.3.2 [46, 47]",
+        any_steering=True,
     ),
     "rear_axle": MethodOfCar(
         navigation(Parts(wheels=True, axle="saturating", adapts=True)),
         "with a saturating rear axle whose stiffness is estimated",
         "section 1.3.2 [46, 47], with another tyre law",
+        any_steering=True,
     ),
     "multi_rate": MethodOfCar(
         multi_rate_of, "a linear single track with yaw rate, and the course at its own rate", "section 1.3.2 [51]"
@@ -47,6 +58,7 @@ METHODS = {
         navigation(Parts(wheels=True, camera=True, axle="saturating", adapts=True)),
         "with a rear axle and a slow, delayed camera of the lane",
         "section 1.3.3 [54, 55]",
+        any_steering=True,
     ),
 }
 

@@ -13,6 +13,7 @@ from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.misfit import Roughness, learn_roughness, no_roughness
 from jaxveh.estimators.navigation.system import BALANCE, ROLLS, STANDS, Navigator, Parts, channels_of, misfit_of
 from jaxveh.estimators.navigation.window import Past, Window, empty_window, look_back, rotate, window_after
+from jaxveh.estimators.rear_steer import CHANNEL, rear_angle
 from jaxveh.vehicles import GRAVITY
 
 FELT = ("a_x", "a_y", "yaw_rate")
@@ -24,7 +25,8 @@ SMOOTH = 0.03
 
 class Felt(NamedTuple):
     """The last row: its time `t` (s); the unit's last measurements by channel, `held`, and their time, `spoke` (s); the
-    low-passed yaw rate, `smooth` (rad/s); the roughness of the lateral acceleration, `rough`; the `window` of the past."""
+    low-passed yaw rate, `smooth` (rad/s); the roughness of the lateral acceleration, `rough`; the `window` of the past; the angle
+    of steered rear wheels, late by half of the time over which the axle's force is averaged, `steer_rear` (rad)."""
 
     t: Any
     held: dict[str, Any]
@@ -32,6 +34,7 @@ class Felt(NamedTuple):
     smooth: Any
     rough: Roughness
     window: Window
+    steer_rear: Any
 
 
 class Cleaning(AbstractCleaning):
@@ -61,7 +64,8 @@ class Cleaning(AbstractCleaning):
         start = {name: nothing + (GRAVITY if name == "a_z" else 0.0) for name in self.unit}
         spoken = jnp.where(jnp.isnan(values["yaw_rate"]), start["yaw_rate"], values["yaw_rate"])
         rough = no_roughness(values["a_y"])
-        memory = Felt(t, start, t - 2.0 * LONGEST_SILENCE, spoken, rough, empty_window(t))
+        rear = nothing + rear_angle(values)
+        memory = Felt(t, start, t - 2.0 * LONGEST_SILENCE, spoken, rough, empty_window(t), rear)
         return self._with_row(memory, t, values)
 
     def next(self, memory, t, values):
@@ -92,7 +96,15 @@ class Cleaning(AbstractCleaning):
             apart = values["wheel_speed_rr"] - values["wheel_speed_rl"] - self.system.track * held["yaw_rate"]
             cleaned["wheels_apart"] = jnp.where(jnp.isnan(apart), 0.0, apart)
         cleaned["felt"] = t - spoke <= LONGEST_SILENCE
-        return Felt(t, held, spoke, smooth, rough, window), cleaned
+        rear = cleaned[CHANNEL] = self._rear_steer(memory.steer_rear, values, dt)
+        return Felt(t, held, spoke, smooth, rough, window, rear), cleaned
+
+    def _rear_steer(self, last: Any, values, dt: Any) -> Any:
+        """The angle of the rear wheels (rad) at the time of the axle's balance."""
+        now = jnp.zeros_like(dt) + rear_angle(values)
+        if self.parts.axle == "none":
+            return now
+        return last + dt / (0.5 * self.system.axle_time + dt) * (now - last)
 
     def _at_centre(self, held, yaw_acceleration) -> dict[str, Any]:
         """Accelerations of the centre of gravity in a plane motion; other channels unchanged."""

@@ -10,6 +10,7 @@ from jaxveh import numerics
 from jaxveh._core.names import record, record_type
 from jaxveh.estimators.navigation.system import BALANCE, ROLLS, SLOWEST, STANDS, Navigator, channels_of, misfit_of
 from jaxveh.estimators.navigation.window import rotate
+from jaxveh.estimators.rear_steer import CHANNEL
 from jaxveh.vehicles import GRAVITY
 
 WHEELS_APART = 5.0
@@ -44,7 +45,9 @@ def observation(system: Navigator, t, x, u) -> Any:
         slips = x.wheel_scale + x.wheel_slip * u.a_x
         seen["wheel_speed"] = (1.0 + slips) * numerics.sqrt(jnp.square(x.v_x) + 1e-4)
     if parts.axle == "none":
-        seen[ROLLS] = x.v_y - system.rear_axle_to_cg * (u.yaw_rate - x.bias_yaw_rate)
+        seen[ROLLS] = (
+            x.v_y - system.rear_axle_to_cg * (u.yaw_rate - x.bias_yaw_rate) - x.v_x * numerics.tan(rear_steer(u))
+        )
     else:
         seen[BALANCE] = balance(system, x, u)
     if parts.camera:
@@ -111,8 +114,13 @@ def balance(system: Navigator, x, u) -> Any:
         moves.append((ahead, aside, getattr(u, f"{past}_spun")))
     v_x, v_y, spun = ((now + 4.0 * half + whole) / 6.0 for now, half, whole in zip(*moves, strict=True))
     law, _, share = axle_slip(system, x, u)
-    angle = law + x.slip_error * error_growth(system, share)
+    angle = law + x.slip_error * error_growth(system, share) - rear_steer(u)
     return v_y - system.rear_axle_to_cg * (spun - x.bias_yaw_rate) + v_x * numerics.tan(angle)
+
+
+def rear_steer(u) -> Any:
+    """The angle of steered rear wheels, rad."""
+    return getattr(u, CHANNEL, 0.0)
 
 
 def error_growth(system: Navigator, share) -> Any:

@@ -7,8 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 from jaxveh.estimators.delays import camera_lag, satellite_lag, unit_delay
+from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.navigation.method import Navigation, navigation_model
 from jaxveh.estimators.navigation.system import PLAIN, Navigator, Parts
+from jaxveh.estimators.rear_steer import with_rear_steer
 from jaxveh.io import AxleTyre, CarSpecification
 from jaxveh.statespace import start_from
 from jaxveh.vehicles import GRAVITY
@@ -23,9 +25,9 @@ SHAPES = 1.0, 8.0
 """Bounds of the curve's shape parameter."""
 
 
-def navigation(parts: Parts) -> Callable[[CarSpecification], Navigation]:
-    """A function that makes a navigation with these `parts` from a car's file."""
-    return lambda car: navigation_of(car, parts)
+def navigation(parts: Parts) -> Callable[[CarSpecification], AbstractMethod]:
+    """A function that makes a navigation with these `parts` from a car's file, whose rear wheels may be steered."""
+    return lambda car: with_rear_steer(navigation_of(car, parts), car)
 
 
 def navigation_of(car: CarSpecification, parts: Parts = PLAIN, **numbers: Any) -> Navigation:
@@ -34,6 +36,7 @@ def navigation_of(car: CarSpecification, parts: Parts = PLAIN, **numbers: Any) -
     For a file without `antenna_position` the antenna is at the centre of gravity; missing delays are those of a usual series car
     (`delays`). `sensor_position` is that of the inertial unit.
     """
+    parts = parts._replace(rear_steer=not car.steers_front_alone)
     antenna = car.antenna_position or (0.0, 0.0, 0.0)
     unit = car.sensor_position or (0.0, 0.0, 0.0)
     told = {

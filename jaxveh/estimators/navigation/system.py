@@ -12,6 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.navigation.window import rotate
+from jaxveh.estimators.rear_steer import CHANNEL
 from jaxveh.estimators.two_axles import AbstractTwoAxles
 from jaxveh.vehicles import GRAVITY
 
@@ -30,7 +31,8 @@ STANDS = "stands"
 class Parts(NamedTuple):
     """The parts of a navigation in addition to accelerations, yaw rate, speed and course. `three_more`: the inertial unit's other
     axes; `heading`: the one from two antennas; `wheels`: the speeds of the rear wheels; `camera`: one that sees the lane; `axle`:
-    the tyre law of the rear axle, "none", "linear" or "saturating"; `adapts`: the stiffness of the rear axle is estimated."""
+    the tyre law of the rear axle, "none", "linear" or "saturating"; `adapts`: the stiffness of the rear axle is estimated;
+    `rear_steer`: the rear wheels are steered."""
 
     three_more: bool = False
     heading: bool = False
@@ -38,6 +40,7 @@ class Parts(NamedTuple):
     camera: bool = False
     axle: str = "none"
     adapts: bool = False
+    rear_steer: bool = False
 
 
 PLAIN = Parts()
@@ -226,13 +229,14 @@ def inputs_of(parts: Parts) -> tuple[str, ...]:
 
     Accelerations at the centre of gravity (m/s^2) and rates (rad/s), held where the unit has no measurement; the `step` (s) since
     the unit's last measurement; the roughness of the lateral acceleration, `rough` (m/s^2); the difference of the rear wheels'
-    speeds beyond that of turning, `wheels_apart` (m/s); for each of `Navigator.lags` the fields of `window.Past`, as `sky_turned`
-    and so on; and the misfit of each channel.
+    speeds beyond that of turning, `wheels_apart` (m/s); the angle of steered rear wheels, `steer_rear` (rad); for each of
+    `Navigator.lags` the fields of `window.Past`, as `sky_turned` and so on; and the misfit of each channel.
     """
     names = ("sky", *(("camera",) if parts.camera else ()), *(("half", "whole") if parts.axle != "none" else ()))
     pasts = tuple(f"{name}_{what}" for name in names for what in ("turned", "gained_x", "gained_y", "spun", "rolled"))
     more = ("a_z", "roll_rate", "pitch_rate") if parts.three_more else ()
     more += ("wheels_apart",) if parts.wheels else ()
+    more += (CHANNEL,) if parts.rear_steer else ()
     return ("a_x", "a_y", "yaw_rate", "step", "rough", *pasts, *more, *[misfit_of(name) for name in channels_of(parts)])
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from jaxveh.estimators.leaning import leaning_filter
 from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
+from jaxveh.estimators.rear_steer import with_rear_steer
 from jaxveh.estimators.roll.gyro import gyro_of
 from jaxveh.estimators.roll.six_axis import six_axis_of
 from jaxveh.estimators.roll.suspension import springs_of, steady_of
@@ -21,23 +22,31 @@ SHOWN = {"roll": "rad", "roll_rate": "rad/s"}
 
 METHODS = {
     "gyro": MethodOfCar(
-        gyro_of, "the integrated gyroscope, slowly drawn to the accelerometer's direction of gravity", "1.1.1 [10]"
+        gyro_of,
+        "the integrated gyroscope, slowly drawn to the accelerometer's direction of gravity",
+        "1.1.1 [10]",
+        any_steering=True,
     ),
     "steady": MethodOfCar(
         lambda car: steady_of(car, NAME),
         "the suspension's roll for the lateral acceleration, on a level road",
         "1.1.1 [10]",
+        any_steering=True,
     ),
     "springs": MethodOfCar(
-        lambda car: springs_of(car, NAME), "the same with the body's inertia and dampers, on a level road", "1.1.1 [10]"
+        lambda car: springs_of(car, NAME),
+        "the same with the body's inertia and dampers, on a level road",
+        "1.1.1 [10]",
+        any_steering=True,
     ),
     "six_axis": MethodOfCar(
         six_axis_of, "attitude and velocity of a six-axis unit, corrected by the wheels' speed", "1.1.2 [9]"
     ),
     "filter": MethodOfCar(
-        lambda car: leaning_filter(car, NAME),
+        lambda car: with_rear_steer(leaning_filter(car, NAME), car),
         "one Kalman filter of bank, roll and the sensors' offsets; uses satellite course and roll gyroscope if available",
         "1.1.1, 1.1.2, 1.3.2 [46]",
+        any_steering=True,
     ),
 }
 

@@ -36,7 +36,10 @@ def _in_tyres(tyre: str, equation: str) -> MethodOfCar:
 
 METHODS = {
     "rear_axle": MethodOfCar(
-        rear_axle, "integration corrected by the rear axle's force, as in `live`", "sections 1.1, 1.2 and 1.3.1; ours"
+        rear_axle,
+        "integration corrected by the rear axle's force, as in `live`",
+        "sections 1.1, 1.2 and 1.3.1; ours",
+        any_steering=True,
     ),
     "open_loop": MethodOfCar(
         open_loop, "linear single track driven by the steer, without correction", "section 1.2.2, [14]"

@@ -9,6 +9,7 @@ from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning
 from jaxveh.estimators.live import Live, live_init, live_step
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.parameter_bands import members_of_prior
+from jaxveh.estimators.prepared import Chained
 from jaxveh.estimators.rear_axle import rear_axle_model
 from jaxveh.estimators.rear_axle_prior import SPREADS, car_of, chosen_parameters, unfitted_spreads
 from jaxveh.estimators.sideslip_methods.common import A_Y, YAW_RATE, Guarded, guard
@@ -26,7 +27,8 @@ class AsLive(AbstractMethod):
 
     @property
     def needs(self):
-        return BLIND
+        steered = self.live.model.system.rear_steer
+        return BLIND if steered is None else BLIND + steered.more
 
     def first(self, t, values):
         return self._said(live_init(self.live, (t, self._of_its_own(values))))
@@ -44,9 +46,11 @@ class AsLive(AbstractMethod):
 
 
 def rear_axle(car: CarSpecification) -> Guarded:
-    """Makes `rear_axle.RearAxle` from a car's file, as `sideslip.live` uses it without a calibration."""
+    """Makes `rear_axle.RearAxle` from a car's file, as `sideslip.live` uses it without a calibration; its rear wheels may be
+    steered."""
     system = car_of(car)
     model = rear_axle_model(system)
-    cleaning = RearAxleCleaning(car.wheelbase)
+    steered, cleaning = system.rear_steer, RearAxleCleaning(car.wheelbase, system.rear_steer is not None)
+    cleaning = cleaning if steered is None else Chained(steered, cleaning)
     members = members_of_prior(model, chosen_parameters, SPREADS, unfitted_spreads(system))
     return guard(car, AsLive(Live(Extended(), model, cleaning, None, members)), (YAW_RATE, A_Y))

@@ -9,6 +9,7 @@ from jaxveh.estimators.car_file import keys_of
 from jaxveh.estimators.delays import SHORTEST_DELAY, satellite_delay, unit_delay
 from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.quantity import estimate_of, live_of
+from jaxveh.estimators.rear_steer import with_rear_steer
 from jaxveh.estimators.speed.abs_peaks import AdaptiveNonlinear
 from jaxveh.estimators.speed.accelerometer import AccelerometerIntegral
 from jaxveh.estimators.speed.car_numbers import FORCE_KEYS, speed_car
@@ -81,9 +82,10 @@ METHODS = {
         "section 2.3, eq 12, refs 34, 83, 96",
     ),
     "slip_aware": MethodOfCar(
-        _slip_aware,
+        lambda car: with_rear_steer(_slip_aware(car), car),
         "error-state filter with slip, radii and slopes, which trusts or rejects each wheel separately",
         "sections 2.1 to 2.3; the trust is ours",
+        any_steering=True,
     ),
 }
 

@@ -11,6 +11,7 @@ from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import steer_heard
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.misfit import learn_misfit, no_misfit
+from jaxveh.estimators.rear_steer import rear_angle, rolls_across
 from jaxveh.estimators.sequential import (
     Belief,
     Innovation,
@@ -22,7 +23,6 @@ from jaxveh.estimators.sequential import (
 )
 from jaxveh.estimators.speed.car_numbers import SpeedCar, forces_of_axles
 from jaxveh.estimators.speed.slip_state import (
-    FRONT,
     HELD,
     LEFT,
     MAY_HELP,
@@ -138,6 +138,7 @@ class SlipAware(AbstractMethod):
 
     def _hear(self, memory: Memory, t, values):
         now = dict(values) | {"steer": steer_heard(values, self.car.steering_ratio, self.car.steer_offset)}
+        now["steer_rear"] = jnp.zeros_like(t) + rear_angle(values)
         torques = [values[f"torque_{place}"] for place in vehicles.CORNERS]
         now["drive_torque"] = jnp.where(jnp.isnan(now["drive_torque"]), sum(torques), now["drive_torque"])
         heard = {n: jnp.where(jnp.isnan(now[n]), memory.heard[n], now[n]) for n in HELD}
@@ -152,8 +153,8 @@ class SlipAware(AbstractMethod):
         of_wheels = (rear[3] - rear[2]) / car.track_rear
         yaw_rate = jnp.where(self._speaks(memory, "yaw_rate"), memory.heard["yaw_rate"], of_wheels)
         a_y = jnp.where(self._speaks(memory, "a_y"), memory.heard["a_y"], x.rolled * yaw_rate)
-        share = car.mass * car.front_axle_to_cg / car.wheelbase
-        v_y = car.rear_axle_to_cg * yaw_rate - x.rolled * share * a_y / car.rear_cornering_stiffness
+        slip = car.mass * car.front_axle_to_cg / car.wheelbase * a_y / car.rear_cornering_stiffness
+        v_y = car.rear_axle_to_cg * yaw_rate + rolls_across(memory.heard, x.rolled) - x.rolled * slip
         return yaw_rate, a_y, v_y
 
     def _acceleration(self, memory: Memory, x: SpeedState):
@@ -224,10 +225,10 @@ class SlipAware(AbstractMethod):
         v_x = x.rolled - (self.wheel_delay - self.a_x_delay) * self._acceleration(memory, x)
         yaw_rate, a_y, _ = self._lateral(memory, x)
         along = v_x - LEFT.astype(v_x.dtype) * 0.5 * front_rear(car.track_front, car.track_rear) * yaw_rate
-        steer = memory.heard["steer"]
-        slip_angle = car.mass * car.rear_axle_to_cg / car.wheelbase * a_y / car.front_cornering_stiffness
-        turned = along * numerics.cos(steer) + v_x * (steer - slip_angle) * numerics.sin(steer)
-        along = jnp.where(FRONT, turned, along)
+        steer = front_rear(memory.heard["steer"], memory.heard["steer_rear"])
+        arms, share = (car.rear_axle_to_cg, car.front_axle_to_cg), car.mass / car.wheelbase * a_y
+        slips = front_rear(*(share * arm / c for arm, c in zip(arms, car.cornering_stiffnesses, strict=True)))
+        along = along * numerics.cos(steer) + v_x * (steer - slips) * numerics.sin(steer)
         share, load = self._shares_of_load(memory, x)
         front, rear = (slip_stiffness(c, n) for c, n in zip(car.cornering_stiffnesses, car.loads, strict=True))
         softness = front_rear(x.softness_front, x.softness_rear)

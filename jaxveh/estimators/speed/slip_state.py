@@ -27,7 +27,9 @@ RADII = slice(6, 10)
 STATES = 13
 """Length of the state."""
 
-HELD = ("a_x", "a_y", "yaw_rate", "steer", "drive_torque", *(f"brake_torque_{at}" for at in vehicles.CORNERS))
+HELD = (
+    "a_x", "a_y", "yaw_rate", "steer", "steer_rear", "drive_torque", *(f"brake_torque_{at}" for at in vehicles.CORNERS)
+)  # fmt: skip
 """Channels that are held between two samples."""
 
 MAY_HELP = tuple(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from jaxveh.estimators.method_of_car import MethodOfCar
 from jaxveh.estimators.quantity import constant_of, live_of, smoothable_estimate_of
+from jaxveh.estimators.rear_steer import with_rear_steer
 from jaxveh.estimators.stiffness.least_squares import AxleForces, Derivatives
 from jaxveh.estimators.stiffness.single_track import linear_car, signals_of
 from jaxveh.estimators.stiffness.walking import walking_stiffness
@@ -19,16 +20,18 @@ SHOWN = {"front_cornering_stiffness": "N/rad", "rear_cornering_stiffness": "N/ra
 
 METHODS = {
     "weighed": MethodOfCar(
-        weighed_stiffness,
+        lambda car: with_rear_steer(weighed_stiffness(car), car),
         "the filter `walking`, with the mass that a filter of grade and mass finds where a log has torques, and the car's file "
         "a wheel_radius; known only after half a minute of steering",
         "section 3.1.2.2, references [46, 47]",
+        any_steering=True,
     ),
     "walking": MethodOfCar(
-        walking_stiffness,
+        lambda car: with_rear_steer(walking_stiffness(car), car),
         "Kalman filter of a linear single track with stiffnesses as slow states, offsets, lean and satellite course; known only "
         "after half a minute of steering",
         "section 3.1.2.2, references [46, 47]",
+        any_steering=True,
     ),
     "axle_forces": MethodOfCar(
         lambda car: AxleForces(linear_car(car), signals_of(car)),

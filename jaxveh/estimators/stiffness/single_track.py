@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.car_file import lean_of
 from jaxveh.estimators.delays import unit_delay
+from jaxveh.estimators.rear_steer import rear_angle
 from jaxveh.estimators.two_axles import (
     LATERAL,
     LONGEST,
@@ -39,7 +40,7 @@ def linear_car(car: CarSpecification) -> LinearCar:
 class Signals(NamedTuple):
     """Time (s); the last measured speed (m/s), steer (rad), yaw rate (rad/s) and a_y (m/s^2), and the steer with the delay of the
     inertial sensors; the low-passed signals; the `ages` (s) of the channels, and whether the car `moves` and all of them are
-    available."""
+    available; the angle of steered rear wheels (rad)."""
 
     t: Any
     v_x: Any
@@ -52,6 +53,7 @@ class Signals(NamedTuple):
     slow_a_y: Any
     ages: Any
     moves: Any
+    steer_rear: Any
 
 
 class Followed(eqx.Module):
@@ -68,7 +70,8 @@ class Followed(eqx.Module):
         old = jnp.where(jnp.stack([jnp.isnan(values[need.channel]) for need in LATERAL]), 1e3, 0.0).astype(t.dtype)
         v_x = known("v_x")
         moves = (old.max() <= LONGEST) & (v_x >= LOWEST)
-        return Signals(t, v_x, steer, steer, yaw_rate, a_y, steer, yaw_rate, a_y, old, moves)
+        rear = jnp.zeros_like(t) + rear_angle(values)
+        return Signals(t, v_x, steer, steer, yaw_rate, a_y, steer, yaw_rate, a_y, old, moves, rear)
 
     def next(self, last: Signals, t, values) -> Signals:
         """The signals after the next row."""
@@ -90,7 +93,7 @@ class Followed(eqx.Module):
         return Signals(
             t, v_x, raw, steer, yaw_rate, a_y, follow(last.slow_steer, last.steer, steer), follow(last.slow_yaw_rate,
             last.yaw_rate, yaw_rate),
-            follow(last.slow_a_y, last.a_y, a_y), ages, moves,
+            follow(last.slow_a_y, last.a_y, a_y), ages, moves, jnp.zeros_like(t) + rear_angle(values),
         )  # fmt: skip
 
 

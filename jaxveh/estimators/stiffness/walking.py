@@ -171,7 +171,7 @@ class WalkingStiffness(AbstractSmoothable):
         rear = car.rear_cornering_stiffness * jnp.exp(jnp.clip(x[3], -1.6, 1.6))
         steer = now.steer - x[9] * (now.steer - now.slow_steer) / self.followed.lag
         front = front * (steer - car.steer_offset - x[4] - (x[0] + car.front_axle_to_cg * x[1]) / v_x)
-        rear = -rear * (x[0] - car.rear_axle_to_cg * x[1]) / v_x
+        rear = rear * (now.steer_rear - (x[0] - car.rear_axle_to_cg * x[1]) / v_x)
         length = car.front_axle_to_cg + car.rear_axle_to_cg
         grips = (_grip(x) * car.mass * GRAVITY / length * arm for arm in (car.rear_axle_to_cg, car.front_axle_to_cg))
         front, rear = (_bent(force, grip) for force, grip in zip((front, rear), grips, strict=True))
