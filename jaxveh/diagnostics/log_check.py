@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from jaxveh._core.errors import InputError
 from jaxveh._core.host import on_host
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.log_delays import check_delays
@@ -14,7 +15,7 @@ from jaxveh.diagnostics.log_samples import check_samples
 from jaxveh.diagnostics.log_sampling import check_sampling
 from jaxveh.diagnostics.log_signs import check_signs, check_wheel_speeds
 from jaxveh.diagnostics.log_steering import check_steering
-from jaxveh.io import CarSpecification, kit, with_road_steer
+from jaxveh.io import CarSpecification, with_road_steer
 
 CHECKS = (
     check_names,
@@ -45,9 +46,15 @@ def check_log(recording: Recording, *, car: CarSpecification | None = None) -> l
     cross-correlation; steering scale and offset; grip and the car's numbers.
     They run on the host in NumPy, and change nothing. Simulated truth (`true.` channels) is not checked.
 
-    **Raises** `InputError` for a car whose rear wheels are steered, because the checks do not include their angles.
+    For a car whose rear wheels are steered, their angle `steer_rear` (rad) is part of the car's model (`io.with_road_steer`).
+
+    **Raises** `InputError` if that angle is missing.
     """
-    if car is not None:
-        kit.check_front_steered(car, "check_log")
-    log = LogView.of(recording if car is None else with_road_steer(car, recording), car)
+    recording = recording if car is None else with_road_steer(car, recording)
+    log = LogView.of(recording, car)
+    if car is not None and not car.steers_front_alone and not log.has("steer_rear"):
+        raise InputError(
+            f'check_log: steer_rear (rad) is missing from the log, but the car\'s file has steering = "{car.steering}". Name the '
+            "column of the rear wheels' angle in the channel map, or leave the steering out of the file if they stay straight."
+        )
     return [finding for check in CHECKS for finding in check(log)]

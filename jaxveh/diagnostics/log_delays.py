@@ -104,7 +104,7 @@ def _longitudinal(log: LogView) -> LogFinding:
         return _judge(log, "a_x", "dv_x/dt", change - log.even("v_y") * log.even("yaw_rate"), "", EXACT)
     if log.car is not None:
         yaw_rate = log.even("yaw_rate")
-        change = change - steady_v_y(log.car, yaw_rate, speed) * yaw_rate
+        change = change - steady_v_y(log.car, yaw_rate, log.rear_steer(), speed) * yaw_rate
     return _judge(log, "a_x", "dv_x/dt", change, "", MODELLED, SLOPES)
 
 
@@ -124,10 +124,10 @@ def _lateral(log: LogView) -> LogFinding:
 
 def _a_y_expected(log: LogView, car: CarSpecification) -> np.ndarray:
     """Return the a_y that the car's linear model predicts from yaw_rate, on the grid."""
-    speed, yaw_rate = log.even("v_x"), log.even("yaw_rate")
-    known = np.isfinite(speed) & np.isfinite(yaw_rate)
-    filled = [np.where(known, values, 0.0) for values in (speed, yaw_rate)]
-    return np.where(known, a_y_from_yaw_rate(car, filled[1], filled[0], log.step), np.nan)
+    seen = log.even("yaw_rate"), log.rear_steer(), log.even("v_x")
+    known = np.isfinite(sum(seen))
+    filled = [np.where(known, values, 0.0) for values in seen]
+    return np.where(known, a_y_from_yaw_rate(car, *filled, log.step), np.nan)
 
 
 def a_y_delay(recording: Recording, car: CarSpecification) -> Delay | None:
@@ -147,7 +147,7 @@ def _steering(log: LogView) -> LogFinding:
     if log.car is None:
         caveat = " Without a car, this includes its own response of some 0.1 s."
         return _judge(log, "yaw_rate", "steer", log.while_moving(steer), caveat, np.inf)
-    expected = yaw_rate_from_steer(log.car, steer, log.even("v_x"), log.step)
+    expected = yaw_rate_from_steer(log.car, steer, log.rear_steer(), log.even("v_x"), log.step)
     if understeer_gradient(log.car) < 0.0:
         caveat = " The car's file oversteers: such a car answers late at speed."
         return _judge(log, "yaw_rate", "the prediction of the car's linear model from steer", expected, caveat, np.inf)

@@ -97,6 +97,11 @@ class LogView:
         on_grid[(self.grid < time[0] - hair) | (self.grid > time[-1] + hair)] = np.nan
         return on_grid
 
+    def rear_steer(self) -> np.ndarray:
+        """Return the angle of the rear wheels (N,) on `grid`, rad; zeros for a car that does not steer them."""
+        steered = self.car is not None and not self.car.steers_front_alone
+        return self.even("steer_rear") if steered else np.zeros_like(self.grid)
+
     @property
     def least_speed(self) -> float:
         """Speed (m/s) above which directions are compared: `MOVING`, but less for small cars."""

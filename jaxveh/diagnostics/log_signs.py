@@ -93,7 +93,8 @@ def _refuted(finding: LogFinding, name: str, other: str) -> LogFinding:
 
 def _correlation(log: LogView, most: float = np.inf) -> float:
     """The correlation of yaw rate and steer where |v_x yaw_rate| has been at most `most` (m/s^2) for half a second, and stays."""
-    steer, yaw_rate = log.smooth(log.even("steer"), 0.2), log.smooth(log.even("yaw_rate"), 0.2)
+    steer = log.smooth(log.even("steer") - log.rear_steer(), 0.2)
+    yaw_rate = log.smooth(log.even("yaw_rate"), 0.2)
     yaw_rate = _gentle(log, log.even("v_x") * yaw_rate, most, yaw_rate)
     coefficients, _, correlation = fit(log.while_moving(yaw_rate), steer)
     return correlation * float(np.sign(coefficients[1]))

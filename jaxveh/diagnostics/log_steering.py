@@ -33,11 +33,12 @@ _YAW_RATE_BIAS = 0.003
 
 def check_steering(log: LogView) -> list[LogFinding]:
     """Check the scale of steer against the geometry, its offset when the car runs straight, and the understeer gradient."""
-    findings = _standstill(log) if log.has("v_x", "yaw_rate") else []
+    findings = (_standstill(log) if log.has("v_x", "yaw_rate") else []) + _unknown_rear_steer(log)
     if not log.has("steer", "yaw_rate", "v_x"):
         return findings
     speed, yaw_rate = log.smooth(log.even("v_x"), 0.2), log.smooth(log.even("yaw_rate"), 0.2)
-    steer = log.while_moving(log.smooth(log.even("steer"), 0.2))
+    # Turned alike, front and rear wheels do not turn the car.
+    steer = log.while_moving(log.smooth(log.even("steer") - log.rear_steer(), 0.2))
     with np.errstate(divide="ignore", invalid="ignore"):
         bend, push = yaw_rate / speed, yaw_rate * speed
         bend = np.where(np.abs(push) < GENTLE, bend, np.nan)
@@ -49,6 +50,20 @@ def check_steering(log: LogView) -> list[LogFinding]:
     if scale.severity in ("ok", "note"):
         findings += _offset(log, steer, bend, push)
     return findings
+
+
+def _unknown_rear_steer(log: LogView) -> list[LogFinding]:
+    """The finding that the rear wheels are turned, which the car's file does not say."""
+    if log.car is None or not log.car.steers_front_alone or not log.has("steer_rear"):
+        return []
+    most = float(np.nanmax(np.abs(log.channels["steer_rear"])))
+    if most <= OFFSET:
+        return []
+    message = (
+        f"is up to {np.rad2deg(most):.2g} degrees, but the car's file says nothing of steered rear wheels, and every estimate "
+        'takes them for straight: set steering = "rear" in the file.'
+    )
+    return [LogFinding("warning", "steer_rear", message, {"most": most})]
 
 
 def _scale(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) -> LogFinding:

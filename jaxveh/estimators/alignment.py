@@ -27,11 +27,9 @@ def a_y_delay(fitted: CarSpecification, told: CarSpecification, recordings: Sequ
 
     The `fitted` car is tried first. A fit may mistake a delay for a soft axle, so the car as `told` (as given) is tried next;
     its delay counts only if it exceeds the error that a wrong stiffness could cause. A `JaxvehWarning` reports a delay that was
-    found. Where the rear wheels are steered, a_y is not timed: how it follows the yaw rate depends on their angle.
+    found.
     """
     recordings = [without_wild_values(one, told.wheelbase) for one in recordings]
-    if not told.steers_front_alone:
-        return 0.0
     for car, softer in ((fitted, 0.0), (told, SOFTER)):
         usual = USUAL + softer * max(_lag(car, one) for one in recordings)
         seconds, error = _found(car, recordings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import equinox as eqx
@@ -18,7 +19,16 @@ from jaxveh.estimators.contract import Need, check_needs
 from jaxveh.io import CarSpecification, with_road_steer
 from jaxveh.statespace import Propagate, Row
 from jaxveh.tyres import AbstractDynamicTyre, Linear
-from jaxveh.vehicles import SingleTrack, from_specification, linear, linear_single_track
+from jaxveh.vehicles import (
+    FrontSteering,
+    IndependentSteering,
+    RearSteering,
+    SingleTrack,
+    from_specification,
+    linear,
+    linear_single_track,
+)
+from jaxveh.vehicles import kit as vehicles
 
 
 def _derivatives(car: SingleTrack, t, x, u):
@@ -26,19 +36,25 @@ def _derivatives(car: SingleTrack, t, x, u):
 
 
 PROPAGATE = Propagate(_derivatives)
-NEEDS = (Need("steer", "rad", throughout=True), Need("v_x", "m/s", throughout=True))
+SPEED = Need("v_x", "m/s", throughout=True)
 
 
 def open_loop(car: Any, recording: Recording) -> dict[str, np.ndarray]:
-    """Simulate a linear single track from `steer` (rad) and `v_x` (m/s) alone, from straight running at the first row.
+    """Simulate a linear single track from the angles of the road wheels (rad) and `v_x` (m/s) alone, from straight running at the
+    first row.
 
-    It has the axles' own cornering stiffnesses at their static loads, without load transfer: `car` is a single track, or any car
+    The angles are the inputs of the car's steering: `steer`, and `steer_rear` of a rear axle with an angle of its own, or those
+    of each wheel. The car has the axles' own cornering stiffnesses at their static loads, without load transfer: `car` is a single track, or any car
     of which `vehicles.linear_single_track` makes one. **Returns** by name, (T,) each: `v_y` (m/s), `yaw_rate` (rad/s),
-    `sideslip` (rad). **Raises** `InputError` for channels that are missing or have gaps, for a car without axles, or one that
-    needs more inputs than `steer`.
+    `sideslip` (rad). **Raises** `InputError` for channels that are missing or have gaps, or for a car without axles.
     """
-    check_needs("open_loop", NEEDS, recording)
-    time, inputs = recording.time, (recording["steer"], recording["v_x"])
+    asked = tuple(Need(name, "rad", throughout=True) for name in getattr(car, "steering", FrontSteering()).inputs)
+    check_needs("open_loop", (*asked, SPEED), recording)
+    angles = {need.channel: recording[need.channel] for need in asked}
+    if len(angles) == len(vehicles.CORNERS):
+        fl, fr, rl, rr = angles.values()
+        angles = {"steer": 0.5 * (fl + fr), "steer_rear": 0.5 * (rl + rr)}
+    time, inputs = recording.time, (angles["steer"], recording["v_x"], angles.get("steer_rear"))
     length = common_length(len(recording))
     # So that float32 resolves the steps of a log whose stamps count from 1970.
     time = lengthen_time(np.asarray(time) - np.asarray(time)[0], length)
@@ -47,14 +63,11 @@ def open_loop(car: Any, recording: Recording) -> dict[str, np.ndarray]:
 
 
 def _linear_car(car: Any) -> SingleTrack:
-    """The single track on linear tyres of a car, whose stiffness does not depend on the load."""
+    """The single track on linear tyres of a car, whose stiffness does not depend on the load. An axle whose wheels have an angle
+    each has their mean."""
     plain = _on_linear_tyres(car)
-    if plain.steering.inputs != ("steer",):
-        raise InputError(
-            f"open_loop: car.steering = {word_for(plain.steering)}: needs {', '.join(plain.steering.inputs)}; must be a "
-            "steering whose only input is steer."
-        )
-    return plain
+    each = isinstance(plain.steering, IndependentSteering)
+    return dataclasses.replace(plain, steering=RearSteering()) if each else plain
 
 
 def _on_linear_tyres(car: Any) -> SingleTrack:
@@ -69,20 +82,26 @@ def _on_linear_tyres(car: Any) -> SingleTrack:
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """`v_y` and `sideslip` of the car's file by `open_loop`; zeros where `steer` or `v_x` is missing."""
-    recording = with_road_steer(car, recording)
-    steered = all(name in recording and np.isfinite(np.asarray(recording[name])).any() for name in ("steer", "v_x"))
-    if not steered:
+    """`v_y` and `sideslip` of the car's file by `open_loop`; zeros where an angle of its wheels or `v_x` is missing."""
+    recording, vehicle = with_road_steer(car, recording), from_specification(car)
+    inputs = (*vehicle.steering.inputs, "v_x")
+    if not all(name in recording and np.isfinite(np.asarray(recording[name])).any() for name in inputs):
         return dict.fromkeys(("v_y", "sideslip"), np.zeros(len(recording)))
-    found = open_loop(from_specification(car), recording)
+    found = open_loop(vehicle, recording)
     return {name: found[name] for name in ("v_y", "sideslip")}
 
 
 @eqx.filter_jit
-def open_loop_of(car: Any, time, steer, v_x) -> dict[str, jax.Array]:
-    """The same as `open_loop` for (T,) arrays, which may be traced."""
+def open_loop_of(car: Any, time, steer, v_x, steer_rear=None) -> dict[str, jax.Array]:
+    """The same as `open_loop` for (T,) arrays, which may be traced. `steer_rear` (rad): of a car whose rear axle has an angle of
+    its own. **Raises** `InputError` if such a car is not given one."""
+    linear_car = _linear_car(car)
     inputs = {"steer": jnp.asarray(steer), "v_x": jnp.asarray(v_x)}
-    states = _drive(_linear_car(car), Row(jnp.asarray(time), record("Inputs", inputs), ()))
+    if "steer_rear" in linear_car.steering.inputs:
+        if steer_rear is None:
+            raise InputError(f"open_loop_of: car.steering = {word_for(car.steering)}: needs steer_rear (rad) as well.")
+        inputs["steer_rear"] = jnp.asarray(steer_rear)
+    states = _drive(linear_car, Row(jnp.asarray(time), record("Inputs", inputs), ()))
     return {
         "v_y": states.v_y, "yaw_rate": states.yaw_rate, "sideslip": numerics.arctan2(states.v_y, inputs["v_x"])
     }  # fmt: skip

@@ -13,6 +13,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, check_one_of, word_for
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh._core.plain import plain_float
+from jaxveh.io import kit as io
 from jaxveh.vehicles.base import AbstractVehicle
 from jaxveh.vehicles.wheels import Wheels, front_rear, is_straight, wheel_names, wheels_of
 
@@ -119,7 +120,7 @@ class FourWheelSteering(AbstractSteering):
     rear_ratio: jax.Array = parameter("-", scale=0.1)
     _: KW_ONLY
     fast_ratio: jax.Array | None = parameter("-", scale=0.1, default=None)
-    middle_speed: jax.Array = positive("m/s", default=20.0)
+    middle_speed: jax.Array = positive("m/s", default=io.USUAL_MIDDLE_SPEED)
     inputs: ClassVar[tuple[str, ...]] = ("steer",)
     front_alone: ClassVar[bool] = False
 
@@ -132,10 +133,7 @@ class FourWheelSteering(AbstractSteering):
 
     def ratio(self, v_x: Any) -> Any:
         """The rear angle over the front angle (-) at the forward speed `v_x` (m/s)."""
-        if self.fast_ratio is None:
-            return self.rear_ratio
-        square = v_x * v_x * (1.0 / (self.middle_speed * self.middle_speed))
-        return (self.rear_ratio + self.fast_ratio * square) / (1.0 + square)
+        return io.rear_ratio(self.rear_ratio, self.fast_ratio, self.middle_speed, v_x)
 
     def angles(self, car, u, v_x):
         del car
