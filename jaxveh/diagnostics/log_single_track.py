@@ -60,8 +60,8 @@ def a_y_from_yaw_rate(
 
 
 def steady_v_y(car: CarSpecification, yaw_rate: np.ndarray, rear: np.ndarray, v_x: np.ndarray) -> np.ndarray:
-    """Return v_y (N,) in m/s in a steady turn of the linear single track with this yaw rate (N,) in rad/s and angle `rear` (N,) of
-    the rear wheels in rad."""
+    """Return v_y (N,) in m/s in a steady turn of the linear single track with this yaw rate (N,) in rad/s and angle `rear` (N,)
+    of the rear wheels in rad."""
     return (car.rear_axle_to_cg - rear_softness(car) * v_x * np.abs(v_x)) * yaw_rate + v_x * rear
 
 

@@ -44,9 +44,10 @@ def open_loop(car: Any, recording: Recording) -> dict[str, np.ndarray]:
     first row.
 
     The angles are the inputs of the car's steering: `steer`, and `steer_rear` of a rear axle with an angle of its own, or those
-    of each wheel. The car has the axles' own cornering stiffnesses at their static loads, without load transfer: `car` is a single track, or any car
-    of which `vehicles.linear_single_track` makes one. **Returns** by name, (T,) each: `v_y` (m/s), `yaw_rate` (rad/s),
-    `sideslip` (rad). **Raises** `InputError` for channels that are missing or have gaps, or for a car without axles.
+    of each wheel. The tyres have the axles' own cornering stiffnesses at their static loads, without load transfer: `car` is a
+    single track, or any car of which `vehicles.linear_single_track` makes one. **Returns** by name, (T,) each: `v_y` (m/s),
+    `yaw_rate` (rad/s), `sideslip` (rad). **Raises** `InputError` for channels that are missing or have gaps, or for a car without
+    axles.
     """
     asked = tuple(Need(name, "rad", throughout=True) for name in getattr(car, "steering", FrontSteering()).inputs)
     check_needs("open_loop", (*asked, SPEED), recording)

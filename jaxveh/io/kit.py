@@ -11,7 +11,7 @@ from jaxveh.io.optional import require
 from jaxveh.io.property_file import PROPERTY_UNITS, Entry, parse_property_file
 from jaxveh.io.result_files import RESULT_SUFFIXES, load_result, save_result
 from jaxveh.io.rig_table import RIG_CHANNELS
-from jaxveh.io.steering import check_front_steered
+from jaxveh.io.steering import USUAL_MIDDLE_SPEED, check_front_steered, rear_ratio
 from jaxveh.io.toml import (
     FILES,
     check_file,
@@ -36,6 +36,7 @@ __all__ = [
     "RESULT_SUFFIXES",
     "RIG_CHANNELS",
     "STEERINGS",
+    "USUAL_MIDDLE_SPEED",
     "Entry",
     "car_lines",
     "car_of_toml",
@@ -53,6 +54,7 @@ __all__ = [
     "of_dataset",
     "parse_property_file",
     "read_toml",
+    "rear_ratio",
     "require",
     "same_unit",
     "save_result",

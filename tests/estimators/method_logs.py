@@ -24,28 +24,30 @@ ROWS, STEP = 300, 0.02
 CORNERS = ("fl", "fr", "rl", "rr")
 
 
-def motion(t, speed):
-    """Speed (m/s), yaw rate, steer and the slopes of the drive, by name."""
+def motion(t, speed, rear=0.0):
+    """Speed (m/s), yaw rate, steer and the slopes of the drive, by name; the rear wheels turn to and fro by `rear` (rad)."""
     v_x = speed * (1.0 + 0.15 * np.sin(0.9 * t))
     steer = 0.03 * np.sin(1.7 * t) + 0.01 * np.sin(4.1 * t + 1.0)
+    steer_rear = rear * np.sin(0.8 * t + 0.3)
     length = CAR.front_axle_to_cg + CAR.rear_axle_to_cg
-    yaw_rate = v_x * steer / (length + 0.003 * v_x**2)
+    yaw_rate = v_x * (steer - steer_rear) / (length + 0.003 * v_x**2)
     slip = CAR.mass * CAR.front_axle_to_cg / (length * CAR.rear_cornering_stiffness)
-    v_y = CAR.rear_axle_to_cg * yaw_rate - slip * v_x * np.abs(v_x) * yaw_rate
+    v_y = CAR.rear_axle_to_cg * yaw_rate - slip * v_x * np.abs(v_x) * yaw_rate + v_x * np.tan(steer_rear)
     return dict(
         v_x=v_x,
         v_y=v_y,
         yaw_rate=yaw_rate,
         steer=steer,
+        steer_rear=steer_rear,
         grade=0.03 * np.sin(0.3 * t),
         bank=0.04 * np.sin(0.4 * t + 0.5),
     )
 
 
-def channels(speed=15.0, seed=0, rows=ROWS):
+def channels(speed=15.0, seed=0, rows=ROWS, rear=0.0):
     """Every channel by name, (T,), and the truth among them."""
     rng, t = np.random.default_rng(seed), STEP * np.arange(rows)
-    one = motion(t, speed)
+    one = motion(t, speed, rear)
     rate = lambda values: np.gradient(values, t)
     v_x, v_y, yaw_rate = one["v_x"], one["v_y"], one["yaw_rate"]
     flat = rate(v_y) + v_x * yaw_rate
@@ -78,14 +80,15 @@ def channels(speed=15.0, seed=0, rows=ROWS):
         **{f"brake_torque_{at}": brake * share for at, share in shares.items()},
         **{f"drive_torque_{at}": 0.25 * drive for at in CORNERS},
         **{name: noise(values, 0.02) for name, values in wheels.items()},
+        **{f"steer_{at}": one["steer" if at in ("fl", "fr") else "steer_rear"] for at in CORNERS},
         **{f"omega_{at}": wheels[f"wheel_speed_{at}"] / CAR.wheel_radius for at in CORNERS},
         **{f"load_{at}": np.full(rows, CAR.mass * G / 4.0) for at in CORNERS},
     }  # fmt: skip
 
 
-def log(needs, speed=15.0, seed=0):
+def log(needs, speed=15.0, seed=0, rows=ROWS, rear=0.0):
     """The channels of `needs` in a recording; those that are optional, too."""
-    made = channels(speed, seed)
+    made = channels(speed, seed, rows, rear)
     lacking = [need.channel for need in needs if need.channel not in made]
     assert not lacking, f"method_logs has no {lacking}: add what a method reads"
     return Recording(
