@@ -20,8 +20,9 @@ from jaxveh.io import kit as io
 READ = tuple(need.channel for need in sideslip.needs)
 """Channels that the estimate reads."""
 
-SEEN = (*READ, "steer")
-"""Channels that the estimator may use; only a fit of the front axle uses the steer."""
+SEEN = (*READ, "steer", "steer_rear", "steer_rl", "steer_rr")
+"""Channels that the estimator may use; only a fit of the front axle uses the steer, and only a car whose file says that its rear
+wheels are steered has their angles."""
 
 NEEDED = tuple(need.channel for need in sideslip.needs if not need.optional)
 """Channels without which there is no estimate."""

@@ -66,6 +66,8 @@ def tell_assumed(
         entry.name
         for entry in dataclasses.fields(car)
         if getattr(car, entry.name) is None
+        # Without these the rear wheels are straight, and no value is assumed.
+        and not entry.name.startswith("rear_steer")
         and (entry.name not in OF_DEVICES or {*OF_DEVICES[entry.name]} & {*channels})
     ]
     used: set[str] = set()

@@ -30,8 +30,8 @@ FULL_CAR = CarSpecification(
 """A car's file with every key, of which one at a time is left out or changed to find the methods that need or use it."""
 
 
-REAR_STEER = ("rear_steer_ratio", "rear_steer_ratio_fast", "rear_steer_speed")
-"""Keys of a car with steered rear wheels."""
+REAR_STEER = {"rear_steer_ratio": -0.2, "rear_steer_ratio_fast": 0.1, "rear_steer_speed": 20.0}
+"""Keys of a car whose rear wheels are steered in a ratio to the front wheels, and their values in one."""
 
 
 def catalogue(quantities: Mapping[str, ModuleType]) -> str:
@@ -68,13 +68,20 @@ def keys_asked(method: MethodOfCar) -> tuple[str, ...]:
 
 def keys_used(method: MethodOfCar, among: Iterable[str] | None = None) -> tuple[str, ...]:
     """The keys of a car's file that the method uses, of all keys or those `among`: for other values of them it has other numbers,
-    or is another method. Keys of steered rear wheels and names are not among them."""
-    values = {entry.name: getattr(FULL_CAR, entry.name) for entry in dataclasses.fields(FULL_CAR)}
-    wanted = values if among is None else among
-    numbers = [key for key in wanted if not (values[key] is None or isinstance(values[key], str) or key in REAR_STEER)]
-    made = method.make(FULL_CAR)
-    other = lambda key: method.make(dataclasses.replace(FULL_CAR, **{key: _another(values[key])}))
-    return tuple(key for key in numbers if not _same(made, other(key)))
+    or is another method. Names and words are not among them."""
+    wanted = [entry.name for entry in dataclasses.fields(FULL_CAR)] if among is None else list(among)
+    steered = dataclasses.replace(FULL_CAR, steering="four-wheel", **REAR_STEER)
+    used = []
+    for car, keys in (
+        (FULL_CAR, set(wanted) - {*REAR_STEER}),
+        (steered, {*REAR_STEER} if method.any_steering else set()),
+    ):
+        made = method.make(car)
+        values = {key: getattr(car, key) for key in keys}
+        numbers = {key: value for key, value in values.items() if not (value is None or isinstance(value, str))}
+        other = lambda key, car=car, values=values: dataclasses.replace(car, **{key: _another(values[key])})
+        used += [key for key in numbers if not _same(made, method.make(other(key)))]
+    return tuple(key for key in wanted if key in used)
 
 
 def _another(value: Any) -> Any:
@@ -106,7 +113,9 @@ def _made(method: MethodOfCar, car: CarSpecification) -> bool:
 def _row(name: str, method: MethodOfCar, module: ModuleType) -> str:
     made = method.of_centre(FULL_CAR)
     needs = made.needs
-    help = f"{method.help} (can be smoothed)" if isinstance(made, AbstractSmoothable) else method.help
+    more = ["can be smoothed"] if isinstance(made, AbstractSmoothable) else []
+    more += ["rear wheels may be steered"] if method.any_steering else []
+    help = f"{method.help} ({'; '.join(more)})" if more else method.help
     reads = [f"[{need.channel}]" if need.optional else need.channel for need in needs]
     shown = f"**{name}**" if name == module.RECOMMENDED else name
     asked = ", ".join(keys_asked(method)) or "nothing more"

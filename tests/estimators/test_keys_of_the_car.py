@@ -16,8 +16,9 @@ from jaxveh import InputError, Recording, estimators, io
 from jaxveh.cli.missing_speed import wants_v_x
 from jaxveh.estimators import kit
 from jaxveh.estimators.at_centre import AtCentre, method_at_centre, moved_to_centre
-from jaxveh.estimators.catalogue import FULL_CAR
+from jaxveh.estimators.catalogue import FULL_CAR, REAR_STEER
 from jaxveh.estimators.fitted_car import roll_gradient_of
+from jaxveh.estimators.prepared import Prepared
 from jaxveh.estimators.rear_axle_prior import car_of
 
 INERTIAL, SKY, STEERED = {"a_x", "a_y"}, {"speed", "course"}, {"steer", "steering_wheel"}
@@ -31,12 +32,12 @@ MATTERS = {
     "rolling_resistance": TORQUES, "front_drive": {"wheel_speed_fl"}, "front_brake": {"brake_torque_fl", "torque_fl"},
     "brake_torque_per_pressure": {"brake_pressure"}, "roll_gradient": {"a_y"}, "pitch_gradient": {"a_x"},
     "roll_frequency": {"roll_rate"}, "roll_damping": {"roll_rate"}, "front": {"steer"}, "rear": {"a_y"},
+    **{key: {"yaw_rate"} for key in REAR_STEER},
 }  # fmt: skip
 """The keys, and the channels of which one makes a method depend on it."""
 
 NO_NUMBERS = {
-    "name": "a name", "steering": "steered rear wheels are refused where they matter (test_steered_rear_wheels)",
-    "rear_steer_ratio": "the same", "rear_steer_ratio_fast": "the same", "rear_steer_speed": "the same",
+    "name": "a name", "steering": "a word; what it changes is in test_steered_rear_wheels",
     "reference_position": "where a truth was measured, for the scores (test_sideslip)",
     "front_tyre": "a file for cars with four wheels", "rear_tyre": "the same",
 }  # fmt: skip
@@ -137,12 +138,14 @@ def displaced(log, car):
 def test_every_method_that_reads_what_turns_with_the_car_hears_it_at_the_centre(quantity, name):
     here, there = made(quantity, name), made(quantity, name, PLACES)
     reads = {need.channel for need in here.needs}
-    assert isinstance(there, AtCentre) == (bool(reads & (INERTIAL | SKY)) and not here.knows_places)
-    if isinstance(there, AtCentre):
+    assert isinstance(there, Prepared) == (bool(reads & (INERTIAL | SKY)) and not here.knows_places)
+    if isinstance(there, Prepared):
+        moves = there.preparation
+        assert isinstance(moves, AtCentre)
         assert isinstance(there, kit.AbstractSmoothable) == isinstance(here, kit.AbstractSmoothable)
         unit = PLACES.sensor_position[:2] if reads & INERTIAL else (0.0, 0.0)
         antenna = PLACES.antenna_position[:2] if reads & SKY else (0.0, 0.0)
-        places = there.unit_x, there.unit_y, there.antenna_x, there.antenna_y
+        places = moves.unit_x, moves.unit_y, moves.antenna_x, moves.antenna_y
         np.testing.assert_array_equal(places, (*unit, *antenna))
 
 
