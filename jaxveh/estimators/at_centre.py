@@ -12,7 +12,7 @@ from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.delays import satellite_lag
 from jaxveh.estimators.method import AbstractMethod
-from jaxveh.estimators.prepared import AbstractPreparation, prepared
+from jaxveh.estimators.prepared import AbstractPreparation, prepare
 from jaxveh.io import CarSpecification
 
 YAW_RATE, SPEED = Need("yaw_rate", "rad/s", optional=True), Need("speed", "m/s", optional=True)
@@ -134,4 +134,4 @@ def method_at_centre(method: Any, car: CarSpecification) -> Any:
     if method.knows_places or not any(places):
         return method
     named = dict(zip(("unit_x", "unit_y", "antenna_x", "antenna_y"), places, strict=True))
-    return prepared(method, AtCentre(**named, lag=satellite_lag(car), over_ground="course" in reads))
+    return prepare(method, AtCentre(**named, lag=satellite_lag(car), over_ground="course" in reads))

@@ -50,6 +50,16 @@ class Need(NamedTuple):
     throughout: bool = False
 
 
+def join_needs(*several: tuple[Need, ...]) -> tuple[Need, ...]:
+    """The needs of all together: optional where each is, and throughout where one is."""
+    found: dict[str, Need] = {}
+    for need in (need for needs in several for need in needs):
+        other = found.get(need.channel, need)
+        optional, throughout = need.optional and other.optional, need.throughout or other.throughout
+        found[need.channel] = need._replace(optional=optional, throughout=throughout)
+    return tuple(found.values())
+
+
 def check_needs(who: str, needs: tuple[Need, ...], recording: Recording, model: StateSpace | None = None) -> None:
     """Raise `InputError` for a channel that is missing from the recording, is in another unit, or has gaps where none are
     allowed.

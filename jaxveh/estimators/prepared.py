@@ -6,7 +6,7 @@ from __future__ import annotations
 import abc
 from typing import Any, NamedTuple
 
-from jaxveh.estimators.contract import Need
+from jaxveh.estimators.contract import Need, join_needs
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable, Answer
 from jaxveh.estimators.sequential import Belief
@@ -18,10 +18,10 @@ class AbstractPreparation(AbstractCleaning):
     @property
     @abc.abstractmethod
     def more(self) -> tuple[Need, ...]:
-        """The channels that it reads; those that the method reads, too, are read as the method needs them."""
+        """The channels that it reads."""
 
     @property
-    def made(self) -> tuple[str, ...]:
+    def makes(self) -> tuple[str, ...]:
         """The channels that it makes beside those that it reads."""
         return ()
 
@@ -38,7 +38,7 @@ class Chained(AbstractCleaning):
 
     @property
     def channels(self):
-        made = set(self.before.made)
+        made = set(self.before.makes)
         return tuple(dict.fromkeys([n for n in self.after.channels if n not in made] + [*self.before.channels]))
 
     @property
@@ -74,8 +74,7 @@ class Prepared(AbstractMethod):
 
     @property
     def needs(self):
-        there = {need.channel for need in self.inner.needs}
-        return (*self.inner.needs, *[need for need in self.preparation.more if need.channel not in there])
+        return join_needs(self.inner.needs, self.preparation.more)
 
     @property
     def knows_places(self):
@@ -111,14 +110,7 @@ class SmoothablePrepared(Prepared, AbstractSmoothable):
         return self.inner.say(memory.inner._replace(belief=memory.belief))
 
 
-def prepared(method: AbstractMethod, preparation: AbstractPreparation) -> Prepared:
+def prepare(method: AbstractMethod, preparation: AbstractPreparation) -> Prepared:
     """The method on prepared rows, which can be smoothed if the method can."""
     kind = SmoothablePrepared if isinstance(method, AbstractSmoothable) else Prepared
     return kind(method, preparation)
-
-
-def unprepared(method: AbstractMethod) -> AbstractMethod:
-    """The method inside all preparations."""
-    while isinstance(method, Prepared):
-        method = method.inner
-    return method

@@ -15,7 +15,7 @@ from jaxveh.estimators.contract import Need, check_needs
 from jaxveh.estimators.delays import SHORTEST_DELAY, unit_delay
 from jaxveh.estimators.live import clean_recording
 from jaxveh.estimators.method import AbstractMethod
-from jaxveh.estimators.prepared import AbstractPreparation, prepared
+from jaxveh.estimators.prepared import AbstractPreparation, prepare
 from jaxveh.estimators.two_axles import LONGEST
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import AbstractSteering, FourWheelSteering, IndependentSteering, kit
@@ -64,7 +64,7 @@ class RearSteer(AbstractPreparation):
         return tuple(dict.fromkeys(("v_x", "yaw_rate", *super().channels)))
 
     @property
-    def made(self):
+    def makes(self):
         return (CHANNEL,)
 
     def first(self, t, values):
@@ -117,7 +117,7 @@ def rear_steer_of(car: CarSpecification) -> RearSteer | None:
 def with_rear_steer(method: AbstractMethod, car: CarSpecification) -> AbstractMethod:
     """A method that reads `rear_angle` in its rows, for a car whose rear wheels may be steered."""
     steered = rear_steer_of(car)
-    return method if steered is None else prepared(method, steered)
+    return method if steered is None else prepare(method, steered)
 
 
 def with_rear_angle(who: str, rear_steer: RearSteer | None, recording: Recording) -> Recording:

@@ -14,7 +14,6 @@ OTHER_MEANINGS = {
     "ALL": "a word of two programs",
     "BEND": "how soon the limits of two different curves of an axle set in",
     "CHANNELS": "what one method measures, and what is drawn below an estimate",
-    "FELT": "what may be behind a low-pass, and what a method needs",
     "FEW": "of members of a family in a message, and of states",
     "KMH": "no choice but a unit, in rooms that cannot import one another",
     "LEAST_FRICTION": "of two tyre laws, of which one divides a slip and the other holds bristles",

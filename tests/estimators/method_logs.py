@@ -28,11 +28,13 @@ def motion(t, speed, rear=0.0):
     """Speed (m/s), yaw rate, steer and the slopes of the drive, by name; the rear wheels turn to and fro by `rear` (rad)."""
     v_x = speed * (1.0 + 0.15 * np.sin(0.9 * t))
     steer = 0.03 * np.sin(1.7 * t) + 0.01 * np.sin(4.1 * t + 1.0)
-    steer_rear = rear * np.sin(0.8 * t + 0.3)
     length = CAR.front_axle_to_cg + CAR.rear_axle_to_cg
-    yaw_rate = v_x * (steer - steer_rear) / (length + 0.003 * v_x**2)
+    yaw_rate = v_x * steer / (length + 0.003 * v_x**2)
     slip = CAR.mass * CAR.front_axle_to_cg / (length * CAR.rear_cornering_stiffness)
-    v_y = CAR.rear_axle_to_cg * yaw_rate - slip * v_x * np.abs(v_x) * yaw_rate + v_x * np.tan(steer_rear)
+    v_y = CAR.rear_axle_to_cg * yaw_rate - slip * v_x * np.abs(v_x) * yaw_rate
+    steer_rear = rear * np.sin(0.8 * t + 0.3)
+    if rear:
+        v_y, steer = on_linear_axles(t, v_x, yaw_rate, steer_rear)
     return dict(
         v_x=v_x,
         v_y=v_y,
@@ -42,6 +44,25 @@ def motion(t, speed, rear=0.0):
         grade=0.03 * np.sin(0.3 * t),
         bank=0.04 * np.sin(0.4 * t + 0.5),
     )
+
+
+def on_linear_axles(t, v_x, yaw_rate, steer_rear):
+    """The lateral speed (m/s) and the steer of the front wheels (rad) of a single track with the file's axles and this yaw rate:
+    exact while the angles of the axles change, as the motion above is not."""
+    m, a, b, length = CAR.mass, CAR.front_axle_to_cg, CAR.rear_axle_to_cg, CAR.wheelbase
+    turning, fine = np.gradient(yaw_rate, t), 20
+    force = lambda k, v_y: CAR.rear_cornering_stiffness * (steer_rear[k] - (v_y - b * yaw_rate[k]) / v_x[k])
+    push = lambda k, v_y: (length * force(k, v_y) + CAR.yaw_inertia * turning[k]) / (a * m)
+    v_y = np.empty_like(t)
+    v_y[0] = b * yaw_rate[0] + v_x[0] * steer_rear[0]
+    for k in range(len(t) - 1):
+        now = v_y[k]
+        for _ in range(fine):
+            now = now + (t[k + 1] - t[k]) / fine * (push(k, now) - v_x[k] * yaw_rate[k])
+        v_y[k + 1] = now
+    a_y = np.gradient(v_y, t) + v_x * yaw_rate
+    front = (b * m * a_y + CAR.yaw_inertia * turning) / length
+    return v_y, front / CAR.front_cornering_stiffness + (v_y + a * yaw_rate) / v_x
 
 
 def channels(speed=15.0, seed=0, rows=ROWS, rear=0.0):
@@ -55,6 +76,9 @@ def channels(speed=15.0, seed=0, rows=ROWS, rear=0.0):
     yaw = np.concatenate([[0.0], np.cumsum(yaw_rate[:-1] * STEP)])
     a_x = rate(v_x) - v_y * yaw_rate + G * np.sin(one["grade"])
     force = CAR.mass * a_x + CAR.drag * v_x * np.abs(v_x) + CAR.rolling_resistance * CAR.mass * G
+    if rear:
+        turned = CAR.rear_axle_to_cg * one["steer"] + CAR.front_axle_to_cg * one["steer_rear"]
+        force = force + CAR.mass * flat * turned / CAR.wheelbase
     torque = force * CAR.wheel_radius
     sides = dict(zip(CORNERS, (-0.75, 0.75, -0.75, 0.75), strict=True))
     wheels = {f"wheel_speed_{at}": v_x + side * yaw_rate for at, side in sides.items()}

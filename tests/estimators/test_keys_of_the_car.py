@@ -91,7 +91,8 @@ def test_a_file_at_the_ends_of_its_ranges_is_taken_or_its_key_is_named():
         if not ends or entry.name in NO_NUMBERS or isinstance(getattr(FULL_CAR, entry.name), tuple):
             continue
         for end in (*ends, *((0.0,) if min(ends) < 0.0 else ())):
-            car = dataclasses.replace(FULL_CAR, **{entry.name: end})
+            steered = {"steering": "four-wheel"} | REAR_STEER if entry.name in REAR_STEER else {}
+            car = dataclasses.replace(FULL_CAR, **{**steered, entry.name: end})
             for quantity, module in QUANTITIES.items():
                 try:
                     module.METHODS[module.RECOMMENDED].make(car)

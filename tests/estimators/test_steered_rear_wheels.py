@@ -13,7 +13,6 @@ from jaxveh import InputError, Recording, diagnostics, estimators, io, vehicles
 from jaxveh.estimators import kit
 from jaxveh.estimators.linear_baseline import open_loop, open_loop_of
 from jaxveh.estimators.method_of_car import TURNING, method_of
-from jaxveh.estimators.prepared import unprepared
 from jaxveh.estimators.rear_steer import RearSteer, rear_steer_of, with_rear_angle
 
 PLAIN = method_logs.CAR
@@ -26,7 +25,7 @@ REAR = STEERED["rear"]
 REFUSAL = (
     r'steering = "rear", but the equations used here hold only for a car with front steering.*estimators.state_space'
 )
-TURNED = 0.03
+TURNED = 0.08
 """rad: by how much the rear wheels turn to and fro in the logs of this file."""
 
 
@@ -65,13 +64,12 @@ KNOWING = [
     for kind in STEERED
 ]
 TRUTHS = {
-    "v_y": 0.35, "sideslip": 0.022, "bank": 0.02, "roll": 0.02, "grade": 0.02, "v_x": 0.3, "mass": 0.05 * PLAIN.mass,
-    "rear_cornering_stiffness": 0.25 * PLAIN.rear_cornering_stiffness,
-    "front_cornering_stiffness": 0.25 * PLAIN.front_cornering_stiffness, "steering_ratio": 1.0, "front_axle_to_cg": 0.15,
-    "yaw": 0.03, "yaw_inertia": 500.0, "steer_offset": 0.003,
+    "v_y": 0.05, "sideslip": 0.003, "bank": 0.002, "roll": 0.002, "grade": 0.002, "v_x": 0.02, "mass": 0.01 * PLAIN.mass,
+    "rear_cornering_stiffness": 0.0, "front_cornering_stiffness": 0.0, "steering_ratio": 0.2, "front_axle_to_cg": 0.02,
+    "yaw": 0.003, "yaw_inertia": 50.0, "steer_offset": 0.0005,
 }  # fmt: skip
-"""What the drive is made of, and the largest error, RMS in the last third of 30 s. Without the angle of the rear wheels, which is
-0.02 rad RMS, most of them are exceeded."""
+"""What the drive is made of, and an error that is allowed beside that for a car with straight rear wheels, RMS in the last third
+of 30 s. Methods that are not told the angle of the rear wheels, which is 0.06 rad RMS, are off by far more."""
 
 
 def truth_of(name, made):
@@ -93,9 +91,9 @@ def test_it_is_as_right_as_for_a_car_with_straight_rear_wheels(quantity, name, k
     plain = module.estimate(PLAIN, drive(needs, 0.0), method=name)
     straight = method_logs.channels(rows=1500)
     last = slice(1000, None)
-    for field in {*module.SHOWN} & {*TRUTHS}:
+    for field in {*module.SHOWN, *({"v_y"} & {*said.mean._fields})} & {*TRUTHS}:
         off = lambda said, made, field=field: np.sqrt(np.mean(np.square((said[field] - truth_of(field, made))[last])))
-        assert off(said, made) <= max(TRUTHS[field], 1.3 * off(plain, straight)), field
+        assert off(said, made) <= max(TRUTHS[field], 1.5 * off(plain, straight)), field
         known = lambda said, field=field: np.mean(np.asarray(getattr(said.known, field))[last])
         assert known(said) >= known(plain) - 0.2, field
 
@@ -191,7 +189,7 @@ def test_gradients_float32_and_batches():
 
 def test_the_parts_of_a_prepared_method():
     method = QUANTITIES["bank"].METHODS["filter"].make(dataclasses.replace(REAR, sensor_position=(1.0, 0.0, 0.0)))
-    assert isinstance(method, kit.AbstractSmoothable) and type(unprepared(method)).__name__ == "Leaning"
+    assert isinstance(method, kit.AbstractSmoothable) and type(method.inner.inner).__name__ == "Leaning"
     assert [need.channel for need in method.needs].count("yaw_rate") == 1
 
 
@@ -205,7 +203,7 @@ def test_a_log_is_checked_against_such_a_car():
     assert ("steer_rear", "warning") in judged(PLAIN, log)
     assert ("steer_rear", "warning") not in judged(PLAIN, log.replace(steer_rear=0.0 * made["steer_rear"]))
     wrong = judged(REAR, log.replace(steer_rear=-made["steer_rear"]))
-    assert ("steer", "warning") in wrong or ("steer", "error") in wrong or ("yaw_rate", "warning") in wrong
+    assert {("steer", "note"), ("yaw_rate", "note")} <= wrong and not {("steer", "note"), ("yaw_rate", "note")} & found
     with pytest.raises(
         InputError, match=r"check_log: steer_rear \(rad\) is missing from the log, but the car's file has"
     ):

@@ -25,7 +25,6 @@ METHODS = {
         gyro_of,
         "the integrated gyroscope, slowly drawn to the accelerometer's direction of gravity",
         "1.1.1 [10]",
-        any_steering=True,
     ),
     "steady": MethodOfCar(
         lambda car: steady_of(car, NAME),

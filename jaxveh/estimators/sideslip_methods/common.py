@@ -159,13 +159,3 @@ def sideslip_answer(v_y: Any, v_x: Any, known: Any = True, std: Any = None) -> A
     # d atan2(v_y, v_x) = v_x / (v_x^2 + v_y^2) d v_y, finite at standstill.
     stds = None if std is None else {"v_y": std, "sideslip": std * jnp.abs(v_x) / jnp.maximum(speed, 1e-6)}
     return answer({"v_y": v_y, "sideslip": numerics.arctan2(v_y, v_x)}, stds, known)
-
-
-def joined_needs(*methods: AbstractMethod) -> tuple[Need, ...]:
-    """The channels that several methods read together."""
-    found: dict[str, Need] = {}
-    for need in (need for method in methods for need in method.needs):
-        other = found.get(need.channel, need)
-        optional, throughout = need.optional and other.optional, need.throughout or other.throughout
-        found[need.channel] = need._replace(optional=optional, throughout=throughout)
-    return tuple(found.values())

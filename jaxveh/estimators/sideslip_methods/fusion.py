@@ -11,13 +11,13 @@ import jax.numpy as jnp
 
 from jaxveh import filters
 from jaxveh._core.parameter import positive
+from jaxveh.estimators.contract import join_needs
 from jaxveh.estimators.memberships import large
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.sideslip_methods.common import (
     A_X,
     Guarded,
     guard,
-    joined_needs,
     sideslip_answer,
     size_of,
 )
@@ -65,7 +65,7 @@ class AbstractFusion(AbstractMethod):
 
     @property
     def needs(self):
-        return joined_needs(self.inner)
+        return join_needs(self.inner.needs)
 
     def first(self, t, values):
         inner, said = self.inner.first(t, values)
@@ -121,7 +121,7 @@ class Switched(AbstractFusion):
 
     @property
     def needs(self):
-        return joined_needs(self.inner, self.steady)
+        return join_needs(self.inner.needs, self.steady.needs)
 
     def fuse(self, memory, dt, rate, model, values):
         a_y = values["a_y"]
@@ -169,7 +169,7 @@ class Weighted(AbstractMethod):
 
     @property
     def needs(self):
-        return joined_needs(self.kinematic, self.dynamic)
+        return join_needs(self.kinematic.needs, self.dynamic.needs)
 
     def first(self, t, values):
         one, other = self.kinematic.first(t, values), self.dynamic.first(t, values)
