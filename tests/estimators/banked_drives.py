@@ -52,9 +52,13 @@ KEPT = [
 ]
 
 
-def drives(car, seeds, duration):
-    """The truth of one car's drives, (seeds, rows) a channel: winding paths, a speed that wavers, random bank and grade."""
+def drives(car, seeds, duration, steering=None):
+    """The truth of one car's drives, (seeds, rows) a channel: winding paths, a speed that wavers, random bank and grade. With a
+    `steering` of its own, the angle of the rear left wheel is among the channels."""
     numbers, vehicle = vehicles.kit.CARS[car](), vehicles.named_car(car, "fourteen-dof")
+    kept = KEPT
+    if steering is not None:
+        vehicle, kept = dataclasses.replace(vehicle, steering=steering), [*KEPT, "steer_rl"]
 
     def one(seed):
         keys = jax.random.split(jax.random.key(seed), 4)
@@ -73,7 +77,7 @@ def drives(car, seeds, duration):
             vehicle, pedals, road=road, dt=STEP, max_step=0.0025, solver="explicit", start={"v_x": speed.at(0.0)[0]},
             throw=False,
         )  # fmt: skip
-        return {name: drive[f"true.{name}"] for name in KEPT} | {n: drive[n] for n in ("drive_torque", "brake_torque")}
+        return {name: drive[f"true.{name}"] for name in kept} | {n: drive[n] for n in ("drive_torque", "brake_torque")}
 
     return jax.tree.map(np.asarray, jax.jit(jax.vmap(one))(jnp.asarray(seeds)))
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import banked_drives
 import jax
 import jax.numpy as jnp
 import method_logs
@@ -121,6 +122,44 @@ def test_a_calibrated_car_is_as_right_and_says_the_same_live_and_from_its_file(t
     np.testing.assert_allclose(said.mean.sideslip, causal.mean.sideslip[39], rtol=1e-9)
     with pytest.raises(InputError, match=r"sideslip: steer_rear \(rad\) is missing from the log"):
         sideslip.estimate(REAR, log.without("steer_rear"))
+
+
+RATIOS = {"straight": None, "alike": 0.5, "against": -0.4}
+"""Rear over front angle."""
+
+
+def heard_with(ratio, name="sedan", count=3):
+    """Channels of simulated drives with fourteen degrees of freedom and production sensors, their truths, and the time."""
+    steering = None if ratio is None else vehicles.FourWheelSteering(ratio)
+    found = banked_drives.drives(name, 500 + np.arange(count), 60.0, steering)
+    cases, truths = [], []
+    for k in range(count):
+        truth = {field: values[k] for field, values in found.items()}
+        said, _, time = banked_drives.heard(name, truth, k)
+        said |= {"steer": said["steering_wheel"] / banked_drives.RATIO, "v_x": 1.003 * truth["v_x"]}
+        cases.append((name, said | ({} if ratio is None else {"steer_rear": truth["steer_rl"]})))
+        truths.append(truth)
+    return cases, truths, time
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("quantity", "least"), [("sideslip", 1.2), ("navigation", 1.15), ("bank", 1.15)])
+def test_simulated_cars_are_estimated_as_well_as_with_straight_rear_wheels(quantity, least):
+    """`least`: how much larger the error is at least if nobody tells of the rear wheels."""
+    field = "bank" if quantity == "bank" else "sideslip"
+    entry, errors = QUANTITIES[quantity].METHODS[QUANTITIES[quantity].RECOMMENDED], {}
+    for kind, ratio in RATIOS.items():
+        cases, truths, time = heard_with(ratio)
+        for told in (True, False) if ratio else (True,):
+            steered = {"steering": "four-wheel", "rear_steer_ratio": ratio} if ratio and told else {}
+            made = lambda car, steered=steered: entry.make(dataclasses.replace(banked_drives.file_of(car), **steered))
+            said = banked_drives.follow_all(made, cases, time)
+            right = [one["bank"] if field == "bank" else np.arctan2(one["v_y"], one["v_x"]) for one in truths]
+            error = np.sqrt(np.mean(np.square(getattr(said.mean, field) - right)[:, 500:], axis=1))
+            errors[kind, told] = float(np.median(error))
+    for kind in ("alike", "against"):
+        assert errors[kind, True] < 1.1 * errors["straight", True]
+        assert errors[kind, False] > least * errors["straight", True]
 
 
 def prepared_rows(car, log):
