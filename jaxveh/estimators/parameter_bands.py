@@ -22,7 +22,7 @@ from jaxveh.fitting import Fit
 from jaxveh.fitting import kit as fitting
 from jaxveh.statespace import Row, StateSpace, kit
 
-WIDER = 1.6
+WIDER = 1.2
 """The bands' width over that from the members and their filters, since no member has other equations (a load that shifts
 within the axle, a curve that depends on it, a body that rolls). Chosen together with `rear_axle_fit.OVERCONFIDENCE` on fleets
 of simulated cars that were calibrated on their own drives (`benchmarks.accuracy`). On 24 drives the 95 % bands contain 97.6 %

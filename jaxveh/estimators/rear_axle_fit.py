@@ -14,11 +14,11 @@ import numpy as np
 from jaxveh._core.errors import FilterError, InputError, warn
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.rear_axle import RearAxle, rolling_below
+from jaxveh.estimators.rear_axle import CHANNEL, RearAxle, rolling_below
 from jaxveh.estimators.rear_axle_prior import SPREADS, STOOD, chosen_parameters
 from jaxveh.estimators.standing import Offsets
 from jaxveh.filters import AbstractFilter
-from jaxveh.fitting import Fit, Target, pose_prediction_error, solve
+from jaxveh.fitting import Fit, PredictionErrorProblem, Target, pose_prediction_error, solve
 from jaxveh.statespace import StateSpace
 
 STEPS, TOLERANCE = 60, 0.02
@@ -28,8 +28,9 @@ SLIDING = ({"grip": 1.02, "slip_error": 3.0, "stiffening": 10.0}, {"grip": 0.77,
 """Starts of further searches: the grip over the largest force in use, and slow errors over their usual values."""
 
 OVERCONFIDENCE = 8.0
-"""The likelihood's information is divided by this: balances of neighbouring rows are correlated but count as independent.
-Chosen together with `parameter_bands.WIDER`, see there."""
+"""The likelihood's information is divided by this, or by this times the `disagreement` of the log's halves if that is above one:
+balances of neighbouring rows are correlated but count as independent, and where the equations are wrong, a half finds values that
+the other half excludes. Chosen together with `parameter_bands.WIDER`, see there."""
 
 UNSURE = 1e-3
 """A variance of the fit may be this share above the prior's; what is more is lost in rounding."""
@@ -53,12 +54,15 @@ def fit_rear_axle(
     reference: Reference | None,
     progress: Progress = silent,
     offsets: Offsets | None = None,
+    *,
+    halves: bool = True,
 ) -> Fit:
     """Maximise the posterior of the parameters that `chosen_parameters` picks, given `coarse_logs` of one car.
 
     A log of a car that slides has two explanations: tyres that saturate at its largest forces, or a road that banks with them.
     The search starts at both, and the better result is returned. The sensors' `offsets`, measured while the car stood, replace
-    the prior's zeros.
+    the prior's zeros. The covariance allows for the `disagreement` of the logs' halves, each of which is fitted, too; without
+    `halves` it does not, for a fit that gives no bands.
 
     If the search runs out of steps, a `JaxvehWarning` is given. **Raises** `InputError` for a log without any measured row at
     speed, `FilterError` if the likelihood is not finite.
@@ -82,25 +86,64 @@ def fit_rear_axle(
     )
     # The largest force, without single peaks.
     starts = _starts(problem, model, max(float(np.quantile(forces, 0.99)), 1e-3))
-    found = []
-    for i, start in enumerate(starts):
-        progress(
-            i, len(starts), "fit the rear axle (compiling first)" if i == 0 else "fit again, from a car that slides"
-        )
-        found.append(solve(problem, start, max_steps=STEPS, tolerance=TOLERANCE))
-    best = min(found, key=lambda fit: float(jnp.where(jnp.isfinite(fit.cost), fit.cost, jnp.inf)))
-    progress(len(starts), len(starts), "fitted")
+    best = _best(problem, starts, progress)
     if not np.isfinite(float(best.cost)):
         raise FilterError(
             "sideslip: the fit's likelihood is not finite: look at the span with `jaxveh check`, or take another."
         )
     if int(best.result) != 0:
         warn(f"sideslip: the fit ended after {int(best.steps)} steps ({best.reason}); its last values are used.")
-    return _widened(best, np.asarray(problem.spread))
+    spread = np.asarray(problem.spread)
+    apart = disagreement(*(_best(half, starts) for half in _halves(problem)), spread) if halves else 1.0
+    return _widened(best, spread, OVERCONFIDENCE * max(apart, 1.0))
 
 
-def _widened(fit: Fit, spread: np.ndarray) -> Fit:
-    """The fit with the likelihood's information divided by `OVERCONFIDENCE`, and the prior's unchanged."""
+def _best(problem: PredictionErrorProblem, starts: Sequence[Any], progress: Progress = silent) -> Fit:
+    """The best of the searches from all starts."""
+    found = []
+    for i, start in enumerate(starts):
+        progress(
+            i, len(starts), "fit the rear axle (compiling first)" if i == 0 else "fit again, from a car that slides"
+        )
+        found.append(solve(problem, start, max_steps=STEPS, tolerance=TOLERANCE))
+    progress(len(starts), len(starts), "fitted")
+    return min(found, key=lambda fit: float(jnp.where(jnp.isfinite(fit.cost), fit.cost, jnp.inf)))
+
+
+def _halves(problem: PredictionErrorProblem) -> list[PredictionErrorProblem]:
+    """The same problem with the measurements of the first half of each log alone, and of the second. Its arrays are as long, so
+    that all share a compiled program."""
+    rows, target = problem.rows, problem.target
+    count = jnp.cumsum(jnp.isfinite(getattr(rows.y, CHANNEL)), axis=1)
+    late = count > count[:, -1:] // 2
+
+    def without(hidden):
+        hide = lambda leaf: jnp.where(hidden, jnp.nan, leaf)
+        kept = target._replace(values=hide(target.values))
+        return dataclasses.replace(problem, rows=rows._replace(y=jax.tree.map(hide, rows.y)), target=kept)
+
+    return [without(late), without(~late)]
+
+
+def disagreement(one: Fit, other: Fit, spread: np.ndarray) -> float:
+    """The squared distance between the parameters of two fits to different data, over the one that is expected if the equations
+    and the fits' covariances are right (a test of J. Hausman's kind, 1978). Infinite where a fit failed. `spread` (p,): the
+    standard deviations of the prior that they share.
+
+    It is measured along each parameter, in units of the fits' variances together. A mean that the prior holds moves less than its
+    variance says, so the expected value is the number of parameters that both logs tell, about 6 of 15.
+    """
+    apart = (np.asarray(one.unconstrained, float) - np.asarray(other.unconstrained, float)) / spread
+    first, second = (np.asarray(fit.covariance, float) / np.outer(spread, spread) for fit in (one, other))
+    variance = np.diag(first + second)
+    # The means are shrunk to the prior's: their difference has the covariance A + B - A B - B A, in the prior's units.
+    expected = np.sum((variance - 2 * np.sum(first * second, axis=1)) / variance)
+    found = float(np.sum(apart**2 / variance) / max(expected, 1.0))
+    return found if np.isfinite(found) else np.inf
+
+
+def _widened(fit: Fit, spread: np.ndarray, overconfidence: float) -> Fit:
+    """The fit with the likelihood's information divided by `overconfidence`, and the prior's unchanged."""
     # Relative to the prior, the variances along the principal directions are between 0 and 1. Where data say nothing,
     # rounding in float32 brings them outside, and the information below zero.
     scale = np.outer(spread, spread)
@@ -112,7 +155,7 @@ def _widened(fit: Fit, spread: np.ndarray) -> Fit:
         )
     shares = np.clip(shares, np.finfo(fit.covariance.dtype).eps, 1.0)
     told, wide = (
-        scale * (directions * one @ directions.T) for one in (shares, 1 / ((1 / shares - 1) / OVERCONFIDENCE + 1))
+        scale * (directions * one @ directions.T) for one in (shares, 1 / ((1 / shares - 1) / overconfidence + 1))
     )
     named, wider = fit.parameters_std, np.sqrt(np.diag(wide) / np.diag(told))
     std = type(named)({p.name: named[p.name] * ratio for p, ratio in zip(fit.chosen, wider, strict=True)})

@@ -138,14 +138,16 @@ def _fit(
     seen = [at_centre(car, one) for one in seen] if uses else seen
     logs = coarse_logs(seen, _wheelbase(start))
     stood = offsets_at_standstill(seen, _wheelbase(start))
-    search = lambda logs, reference, progress: fit_rear_axle(filter, start, logs, reference, progress, stood)
+    search = lambda logs, reference, progress, halves=True: fit_rear_axle(
+        filter, start, logs, reference, progress, stood, halves=halves
+    )
     if not uses:
         return Calibration(NAME, search(logs, None, progress), spans, told=start_of(car, options))
     late = [np.asarray(log.time) >= (span.start + span.end) / 2 for log, span in zip(logs, spans, strict=True)]
     early = [_blank(log, rows, start.channels) for log, rows in zip(logs, late, strict=True)]
     count = 2 + len(TARGET_WEIGHTS)
     fits = [
-        search(early, _reference(early, weight), _part(progress, i, count))
+        search(early, _reference(early, weight), _part(progress, i, count), halves=False)
         for i, weight in enumerate((None, *TARGET_WEIGHTS))
     ]
     errors = [_validate(filter, fit.model, logs, late) for fit in fits]

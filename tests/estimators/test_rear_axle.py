@@ -310,14 +310,14 @@ def test_a_covariance_that_is_lost_in_rounding_is_told_and_stays_positive(seed):
     exact = np.linalg.inv(information + prior)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        wide = rear_axle_fit._widened(fit_of(exact), spread)
-    wanted = np.linalg.inv(information / rear_axle_fit.OVERCONFIDENCE + prior)
+        wide = rear_axle_fit._widened(fit_of(exact), spread, 8.0)
+    wanted = np.linalg.inv(information / 8.0 + prior)
     np.testing.assert_allclose(wide.covariance, wanted, rtol=1e-5, atol=1e-9 * np.abs(wanted).max())
     stds = np.array([wide.parameters_std[one.name] for one in names])
     np.testing.assert_allclose(stds, np.sqrt(np.diag(wanted)), rtol=1e-6)
     # Rounding of this size leaves no variance along what the data tell, and too much along the rest.
     noise = draw.normal(size=(size, size)) * 0.05 * np.outer(spread, spread)
     with pytest.warns(JaxvehWarning, match="lost in rounding.*jax_enable_x64"):
-        rough = rear_axle_fit._widened(fit_of((exact + noise + noise.T).astype(np.float32)), spread)
+        rough = rear_axle_fit._widened(fit_of((exact + noise + noise.T).astype(np.float32)), spread, 8.0)
     assert np.isfinite(rough.covariance).all()
     assert (np.diag(rough.covariance) > 0).all() and (np.diag(rough.covariance) <= spread**2 * (1 + 1e-6)).all()

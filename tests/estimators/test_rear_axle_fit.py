@@ -1,0 +1,58 @@
+"""How sure a fit of the rear axle is: less where the halves of its log contradict each other."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import test_rear_axle
+import test_sideslip
+
+from jaxveh import estimators
+from jaxveh.estimators import rear_axle_fit
+
+SPREAD = np.array([0.3, 2.0, 0.05, 1.0, 1.0])
+
+
+def fits_of_two_halves(draw, noise=1.0):
+    """Posteriors of one truth from two sets of linear data, which tell nothing of the last parameter. The data are `noise` times
+    as noisy as the fits assume."""
+    truth = SPREAD * draw.normal(size=5)
+    for _ in range(2):
+        slopes = draw.normal(size=(12, 5)) / SPREAD * [1.0, 1.0, 0.3, 0.1, 0.0]
+        covariance = np.linalg.inv(slopes.T @ slopes + np.diag(1 / SPREAD**2))
+        seen = slopes @ truth + noise * draw.normal(size=12)
+        yield SimpleNamespace(unconstrained=covariance @ slopes.T @ seen, covariance=covariance)
+
+
+def test_halves_of_data_that_are_as_assumed_disagree_as_expected():
+    draw = np.random.default_rng(3)
+    mean = lambda noise: np.mean(
+        [rear_axle_fit.disagreement(*fits_of_two_halves(draw, noise), SPREAD) for _ in range(400)]
+    )
+    assert mean(1.0) == pytest.approx(1.0, abs=0.1)
+    assert mean(3.0) > 4.0
+
+
+def test_halves_that_tell_nothing_do_not_disagree_and_one_that_failed_does():
+    told_nothing = SimpleNamespace(unconstrained=np.zeros(5), covariance=np.diag(SPREAD**2))
+    assert rear_axle_fit.disagreement(told_nothing, told_nothing, SPREAD) == 0.0
+    failed = SimpleNamespace(unconstrained=np.full(5, np.nan), covariance=np.diag(SPREAD**2))
+    assert rear_axle_fit.disagreement(told_nothing, failed, SPREAD) == np.inf
+
+
+def share_of_prior(log):
+    """The standard deviation of the stiffness after a calibration, over the prior's."""
+    fit = estimators.sideslip.calibrate(test_sideslip.CAR, log.without("v_y")).fit
+    return float(np.sqrt(fit.covariance[0, 0])) / estimators.sideslip.SPREADS[fit.names[0].split(".")[-1]]
+
+
+def test_a_log_that_contradicts_itself_has_wider_bands(monkeypatch):
+    """In the second half, a_y is 1 m/s^2 higher, which no equation of the model allows for; the sound drive keeps its bands."""
+    log = test_rear_axle.drive_of(test_sideslip.CAR)
+    late = np.asarray(log.time) > np.mean(log.time)
+    broken = log.replace(a_y=np.asarray(log["a_y"]) + 1.0 * late)
+    sound, wide = share_of_prior(log), share_of_prior(broken)
+    # As if there were no such measure: only a fit of the whole log.
+    monkeypatch.setattr(rear_axle_fit, "disagreement", lambda *fits: 1.0)
+    assert sound == share_of_prior(log)
+    assert wide > 1.5 * share_of_prior(broken) and wide > 2 * sound
