@@ -28,9 +28,14 @@ SLIDING = ({"grip": 1.02, "slip_error": 3.0, "stiffening": 10.0}, {"grip": 0.77,
 """Starts of further searches: the grip over the largest force in use, and slow errors over their usual values."""
 
 OVERCONFIDENCE = 8.0
-"""The likelihood's information is divided by this, or by this times the `disagreement` of the log's halves if that is above one:
-balances of neighbouring rows are correlated but count as independent, and where the equations are wrong, a half finds values that
-the other half excludes. Chosen together with `parameter_bands.WIDER`, see there."""
+"""The likelihood's information is divided by this, and also by the `disagreement` of the logs' halves where that is above one:
+balances of neighbouring rows are correlated but count as independent, and where the equations are wrong, one half finds values
+that the other excludes. Chosen together with `parameter_bands.WIDER`, see there.
+
+The disagreement is 0.4 to 3.9 on 94 simulated drives (the middle 80 %, median 1.3), 1.7 and 3.0 on the halves of the Ferrari, 3.8
+and 4.2 on those of the F1TENTH, 5.6 on all of it. It tells cars apart, not drives: its rank correlation with the width that each
+simulated drive needs is 0.14. Nothing that was tried has more than 0.34: correlation and kurtosis of the innovations, the scores'
+variance over the information, the likelihood of the other half, noise levels and values over their priors."""
 
 UNSURE = 1e-3
 """A variance of the fit may be this share above the prior's; what is more is lost in rounding."""
@@ -55,7 +60,7 @@ def fit_rear_axle(
     progress: Progress = silent,
     offsets: Offsets | None = None,
     *,
-    halves: bool = True,
+    halves: bool,
 ) -> Fit:
     """Maximise the posterior of the parameters that `chosen_parameters` picks, given `coarse_logs` of one car.
 
