@@ -27,13 +27,13 @@ STEPS, TOLERANCE = 60, 0.02
 SLIDING = ({"grip": 1.02, "slip_error": 3.0, "stiffening": 10.0}, {"grip": 0.77, "slip_error": 5.0, "stiffening": 30.0})
 """Starts of further searches: the grip over the largest force in use, and slow errors over their usual values."""
 
-OVERCONFIDENCE = 8.0
+OVERCONFIDENCE = 16.0
 """The likelihood's information is divided by this, and also by the `disagreement` of the logs' halves where that is above one:
 balances of neighbouring rows are correlated but count as independent, and where the equations are wrong, one half finds values
 that the other excludes. Chosen together with `parameter_bands.WIDER`, see there.
 
 The disagreement is 0.4 to 3.9 on 94 simulated drives (the middle 80 %, median 1.3), 1.7 and 3.0 on the halves of the Ferrari, 3.8
-and 4.2 on those of the F1TENTH, 5.6 on all of it. It tells cars apart, not drives: its rank correlation with the width that each
+and 4.1 on those of the F1TENTH, 5.1 on all of it. It tells cars apart, not drives: its rank correlation with the width that each
 simulated drive needs is 0.14. Nothing that was tried has more than 0.34: correlation and kurtosis of the innovations, the scores'
 variance over the information, the likelihood of the other half, noise levels and values over their priors."""
 

@@ -265,7 +265,7 @@ def test_the_likelihood_counts_for_less_than_it_says_and_the_prior_as_it_is(monk
     monkeypatch.setattr(rear_axle_fit, "OVERCONFIDENCE", 1.0)
     narrow = calibrate()
     # Known by the log, and by the prior alone.
-    assert 2.1 < float(wide["stiffness"] / narrow["stiffness"]) < 8.0**0.5 + 0.01
+    assert 2.1 < float(wide["stiffness"] / narrow["stiffness"]) < rear_axle_fit.OVERCONFIDENCE**0.5 + 0.01
     assert float(wide["heading_offset"] / narrow["heading_offset"]) == pytest.approx(1.0, rel=1e-3)
 
 
