@@ -15,12 +15,16 @@ from jaxveh._core.recording import gap_to_fill
 from jaxveh.cli.several_logs import LACKS
 from jaxveh.diagnostics import kit
 from jaxveh.estimators import sideslip
+from jaxveh.io import CarSpecification
 from jaxveh.io import kit as io
 
 READ = tuple(need.channel for need in sideslip.needs)
 """Channels that the estimate reads."""
 
-SEEN = (*READ, "steer", "steer_rear", "steer_rl", "steer_rr")
+REAR_ANGLES = ("steer_rear", "steer_rl", "steer_rr")
+"""Angles of the rear wheels, which are read for a car whose file says that they are steered."""
+
+SEEN = (*READ, "steer", *REAR_ANGLES)
 """Channels that the estimator may use; only a fit of the front axle uses the steer, and only a car whose file says that its rear
 wheels are steered has their angles."""
 
@@ -29,6 +33,13 @@ NEEDED = tuple(need.channel for need in sideslip.needs if not need.optional)
 
 INPUTS = tuple(need.channel for need in sideslip.needs if need.throughout)
 """Channels that must be finite in every row."""
+
+
+def read_for(car: CarSpecification) -> tuple[str, ...]:
+    """Return the channels that the estimate reads for a car."""
+    if car.steers_front_alone:
+        return READ
+    return (*READ, *REAR_ANGLES, *(("steer",) if car.steering == "four-wheel" else ()))
 
 
 def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
@@ -46,7 +57,7 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
             f"{LACKS}{', '.join(missing)}; it must have {', '.join(NEEDED)}.{' ' if likely else ''}{likely} Map their "
             "columns with --channels (jaxveh schema channels)."
         )
-    for name in (*INPUTS, *(("steer",) if "steer" in recording else ())):
+    for name in (*INPUTS, *(name for name in ("steer", *REAR_ANGLES) if name in recording)):
         recording = fill_short(recording, name, max_gap)
         gaps = np.isnan(np.asarray(recording[name]))
         if name in INPUTS and gaps.any():

@@ -14,7 +14,7 @@ from jaxveh import InputError, Recording, io
 from jaxveh._core.errors import check_at_least, check_one_of
 from jaxveh._core.recording import TRUTH as SIMULATED
 from jaxveh.cli import options, quantities, quantity_options, sideslip
-from jaxveh.cli.blanking import READ, LogParts, split
+from jaxveh.cli.blanking import LogParts, read_for, split
 from jaxveh.cli.calibration_words import say_source, source_in_words
 from jaxveh.cli.console import number, progress, results, table
 from jaxveh.cli.drives import Drive, read_drives
@@ -192,7 +192,7 @@ def _estimate(choice: Choice, several: SeveralLogs) -> tuple[Any, dict[str, Any]
     found = None if choice.calibration is None else sideslip.read_calibration(choice.calibration, told)
     car = _car(told, found)
     # The open-loop baseline of a score is driven by the steer.
-    used = {*READ, *choice.calibrate_on, *((choice.truth, "steer") if choice.truth else ())}
+    used = {*read_for(car), *choice.calibrate_on, *((choice.truth, "steer") if choice.truth else ())}
     drives = read_drives(several, car, choice.channels, choice.fill, choice.span, used, choice.anyway)
     choice, drives = _with_simulated_truth(choice, drives, several)
     jobs = several.each(lambda drive: _job(choice, car, drive, products[drive.log]), drives)

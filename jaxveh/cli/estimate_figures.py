@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from jaxveh import InputError, Recording
 from jaxveh.cli import sideslip
 from jaxveh.cli.console import results
@@ -21,8 +19,8 @@ def beside(car: CarSpecification, seen: Recording, truth: str | None) -> tuple[A
     """Return the truth by name (None if there is none), and the curves beside it: the baseline, if there are truth and steer."""
     if truth is None:
         return None, {}
-    steered = "steer" in seen and np.isfinite(np.asarray(seen["steer"])).any()
-    return sideslip.truth_of(car, seen, truth), {OPEN_LOOP: sideslip.open_loop(car, seen)} if steered else {}
+    baseline = sideslip.open_loop(car, seen)
+    return sideslip.truth_of(car, seen, truth), {} if baseline is None else {OPEN_LOOP: baseline}
 
 
 def draw(

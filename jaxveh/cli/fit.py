@@ -9,7 +9,7 @@ import typer
 
 from jaxveh import InputError, estimators, io
 from jaxveh.cli import options, sideslip
-from jaxveh.cli.blanking import READ, calibration_part
+from jaxveh.cli.blanking import calibration_part, read_for
 from jaxveh.cli.calibration_words import print_fitted
 from jaxveh.cli.console import progress, results
 from jaxveh.cli.drives import Drive, read_drives
@@ -62,7 +62,7 @@ def fit(
     check_report(out, numbers)
     check_folders(out, logs)
     car, uses = car_of(vehicle), tuple(calibrate_on or ())
-    used, several = {*READ, *uses, *(("steer",) if car_file or out else ())}, SeveralLogs(logs)
+    used, several = {*read_for(car), *uses, *(("steer",) if car_file or out else ())}, SeveralLogs(logs)
     read = read_drives(several, car, channels, fill, span, used, anyway)
     parts = list(several.each(lambda drive: calibration_part(drive.recording, uses), read).values())
     several.check_all()

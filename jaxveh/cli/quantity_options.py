@@ -29,8 +29,11 @@ USUAL_FILTER, USUAL_PARTICLES = "ekf", 1000
 ALL = "all"
 """In `--what`: each quantity that the log has channels for, by its recommended method; in `--methods`: all methods."""
 
-FILLED = ("steer", "v_x", "a_x")
+FILLED = ("steer", "steer_rear", "steer_rl", "steer_rr", "v_x", "a_x")
 """Channels that `--fill` fills for every quantity; for a method also those that it needs in every row."""
+
+RATIOS = ("rear_steer_ratio", "rear_steer_ratio_fast", "rear_steer_speed")
+"""Keys of a car whose rear wheels are steered in a ratio to the front wheels."""
 
 SATELLITES = ("speed", "course", "climb_rate", "heading")
 """The channels of a satellite receiver."""
@@ -66,8 +69,8 @@ def tell_assumed(
         entry.name
         for entry in dataclasses.fields(car)
         if getattr(car, entry.name) is None
-        # Without these the rear wheels are straight, and no value is assumed.
-        and not entry.name.startswith("rear_steer")
+        # Without a ratio the rear wheels are straight, and nothing is assumed.
+        and (entry.name not in RATIOS or (entry.name == RATIOS[-1] and car.rear_steer_ratio_fast is not None))
         and (entry.name not in OF_DEVICES or {*OF_DEVICES[entry.name]} & {*channels})
     ]
     used: set[str] = set()

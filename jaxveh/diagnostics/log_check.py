@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from jaxveh._core.errors import InputError
 from jaxveh._core.host import on_host
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.log_delays import check_delays
@@ -46,15 +45,23 @@ def check_log(recording: Recording, *, car: CarSpecification | None = None) -> l
     cross-correlation; steering scale and offset; grip and the car's numbers.
     They run on the host in NumPy, and change nothing. Simulated truth (`true.` channels) is not checked.
 
-    For a car whose rear wheels are steered, their angle `steer_rear` (rad) is part of the car's model (`io.with_road_steer`).
-
-    **Raises** `InputError` if that angle is missing.
+    For a car whose rear wheels are steered, their angle `steer_rear` (rad) is part of the car's model (`io.with_road_steer`); if
+    it is missing, that is an error, and nothing is compared with the car.
     """
     recording = recording if car is None else with_road_steer(car, recording)
     log = LogView.of(recording, car)
-    if car is not None and not car.steers_front_alone and not log.has("steer_rear"):
-        raise InputError(
-            f'check_log: steer_rear (rad) is missing from the log, but the car\'s file has steering = "{car.steering}". Name the '
-            "column of the rear wheels' angle in the channel map, or leave the steering out of the file if they stay straight."
-        )
-    return [finding for check in CHECKS for finding in check(log)]
+    unknown = [] if car is None or car.steers_front_alone or log.has("steer_rear") else [_no_rear_angle(car)]
+    log = LogView.of(recording, None) if unknown else log
+    return unknown + [finding for check in CHECKS for finding in check(log)]
+
+
+def _no_rear_angle(car: CarSpecification) -> LogFinding:
+    """The finding that the log does not tell the angle of the rear wheels, which the car's file says are steered."""
+    others = (
+        "steer, steering_wheel or the rear wheels' angle" if car.steering == "four-wheel" else "the rear wheels' angle"
+    )
+    message = (
+        f'is missing, but the car\'s file has steering = "{car.steering}": nothing is compared with the car. Name the column of '
+        f"{others} in the channel map, or leave the steering out of the file if they stay straight."
+    )
+    return LogFinding("error", "steer_rear", message, {})

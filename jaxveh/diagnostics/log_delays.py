@@ -126,7 +126,10 @@ def _a_y_expected(log: LogView, car: CarSpecification) -> np.ndarray:
     """Return the a_y that the car's linear model predicts from yaw_rate, on the grid."""
     seen = log.even("yaw_rate"), log.rear_steer(), log.even("v_x")
     known = np.isfinite(sum(seen))
-    filled = [np.where(known, values, 0.0) for values in seen]
+    if not known.any():
+        return np.full(known.shape, np.nan)
+    # Bridged: the angle of the rear wheels is differentiated.
+    filled = [np.interp(log.grid, log.grid[known], values[known]) for values in seen]
     return np.where(known, a_y_from_yaw_rate(car, *filled, log.step), np.nan)
 
 

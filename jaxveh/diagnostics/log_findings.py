@@ -98,8 +98,8 @@ class LogView:
         return on_grid
 
     def rear_steer(self) -> np.ndarray:
-        """Return the angle of the rear wheels (N,) on `grid`, rad; zeros for a car that does not steer them."""
-        steered = self.car is not None and not self.car.steers_front_alone
+        """Return the angle of the rear wheels (N,) on `grid`, rad; zeros for a car that does not steer them and a log without."""
+        steered = self.car is not None and not self.car.steers_front_alone and self.has("steer_rear")
         return self.even("steer_rear") if steered else np.zeros_like(self.grid)
 
     @property

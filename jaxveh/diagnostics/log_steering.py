@@ -54,16 +54,19 @@ def check_steering(log: LogView) -> list[LogFinding]:
 
 def _unknown_rear_steer(log: LogView) -> list[LogFinding]:
     """The finding that the rear wheels are turned, which the car's file does not say."""
-    if log.car is None or not log.car.steers_front_alone or not log.has("steer_rear"):
+    there = [name for name in ("steer_rear", "steer_rl", "steer_rr") if log.has(name)]
+    if log.car is None or not log.car.steers_front_alone or not there:
         return []
-    most = float(np.nanmax(np.abs(log.channels["steer_rear"])))
-    if most <= OFFSET:
+    # Without single spikes.
+    usual = {name: float(np.nanquantile(np.abs(log.channels[name]), 0.99)) for name in there}
+    name = max(usual, key=lambda one: usual[one])
+    if usual[name] <= OFFSET:
         return []
     message = (
-        f"is up to {np.rad2deg(most):.2g} degrees, but the car's file says nothing of steered rear wheels, and every estimate "
-        'takes them for straight: set steering = "rear" in the file.'
+        f"is up to {np.rad2deg(usual[name]):.2g} degrees, but the car's file says nothing of steered rear wheels, and every "
+        'estimate takes them for straight: set steering = "rear", "four-wheel" or "independent" in the file.'
     )
-    return [LogFinding("warning", "steer_rear", message, {"most": most})]
+    return [LogFinding("warning", name, message, {"most": usual[name]})]
 
 
 def _scale(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) -> LogFinding:

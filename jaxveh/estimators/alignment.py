@@ -72,7 +72,12 @@ def on_time(recording: Recording, system: RearAxle) -> Recording:
     delay as well."""
     low_pass, a_y = float(system.sensor_delay), float(system.a_y_delay)
     late = {name: low_pass + (a_y if name == "a_y" else 0.0) for name in FELT if name in recording}
-    return recording.replace(**{name: _earlier(recording, name, by) for name, by in late.items() if by})
+    moved = {name: _earlier(recording, name, by) for name, by in late.items() if by}
+    if "steer_rear" in moved:
+        # An input, which every row must have.
+        time = np.asarray(recording.time, float)
+        moved["steer_rear"] = np.interp(time + late["steer_rear"], time, np.asarray(recording["steer_rear"], float))
+    return recording.replace(**moved)
 
 
 def _earlier(recording: Recording, name: str, seconds: float) -> np.ndarray:

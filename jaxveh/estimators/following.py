@@ -15,6 +15,7 @@ from jaxveh._core.lengths import common_length, lengthen, lengthen_time, shorten
 from jaxveh._core.recording import Recording, time_for
 from jaxveh.estimators.contract import check_needs
 from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable, Answer, Answers, dtype_of
+from jaxveh.estimators.rear_steer import check_rear_angle
 from jaxveh.estimators.sequential import Belief
 from jaxveh.numerics import apart
 
@@ -39,6 +40,7 @@ def follow(who: str, method: AbstractMethod, recording: Recording, *, smoothed: 
             f"{who}: smoothed: {type(method).__name__} looks back only. Leave smoothed out, or take the recommended "
             "method or another kit.AbstractSmoothable."
         )
+    check_rear_angle(who, method, recording)
     there = [need for need in method.needs if not need.optional or need.channel in recording]
     check_needs(who, tuple(need._replace(optional=False) for need in there), recording)
     for need in there:

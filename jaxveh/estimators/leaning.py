@@ -18,7 +18,7 @@ from jaxveh.estimators.delays import satellite_lag
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractSmoothable, answer
 from jaxveh.estimators.misfit import Misfit, Roughness, learn_roughness, no_misfit, no_roughness
-from jaxveh.estimators.rear_steer import rear_angle
+from jaxveh.estimators.rear_steer import rolls_across
 from jaxveh.estimators.sequential import Belief, Measurement, belief_of, correct_by_each, move, spread_of
 from jaxveh.estimators.steer_agreement import AgreementMemory, SteerAgreement, agreement_of
 from jaxveh.io import CarSpecification
@@ -194,7 +194,7 @@ class Leaning(AbstractSmoothable):
         def residual(x):
             turn = heard["yaw_rate"] - x.yaw_rate_bias
             slip = self.rear_compliance * (1.0 + x.rear_scale) * self._plane_force(x, heard) * (heard["v_x"] / fast)
-            return rear_angle(heard) * (heard["v_x"] / fast) - (x.v_y - self.rear_axle_to_cg * turn) / fast - slip
+            return (rolls_across(heard, heard["v_x"]) - (x.v_y - self.rear_axle_to_cg * turn)) / fast - slip
 
         # A correlated error counts once per correlation time, however many rows there are; in hard turns tyres are not linear.
         repeats = 2.0 * self.slip_error_time / jnp.maximum(heard["dt"], 1e-3)

@@ -82,14 +82,27 @@ def _on_linear_tyres(car: Any) -> SingleTrack:
     )  # fmt: skip
 
 
+def open_loop_of_file(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray] | None:
+    """`open_loop` of a car's file, along a log that has the angles of its wheels or those from which they follow
+    (`io.with_road_steer`); None if one of them, or `v_x`, has no value."""
+    recording, vehicle = with_road_steer(car, recording), from_specification(car)
+    if not car.steers_front_alone:
+        vehicle = dataclasses.replace(vehicle, steering=RearSteering())
+    told = lambda name: name in recording and np.isfinite(np.asarray(recording[name])).any()
+    if not all(told(name) for name in (*vehicle.steering.inputs, "v_x")):
+        return None
+    if not car.steers_front_alone:
+        # Their sensor may be slower than the log.
+        time, angle = np.asarray(recording.time, float), np.asarray(recording["steer_rear"])
+        known = np.isfinite(angle)
+        recording = recording.replace(steer_rear=np.interp(time, time[known], angle[known]))
+    return open_loop(vehicle, recording)
+
+
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
     """`v_y` and `sideslip` of the car's file by `open_loop`; zeros where an angle of its wheels or `v_x` is missing."""
-    recording, vehicle = with_road_steer(car, recording), from_specification(car)
-    inputs = (*vehicle.steering.inputs, "v_x")
-    if not all(name in recording and np.isfinite(np.asarray(recording[name])).any() for name in inputs):
-        return dict.fromkeys(("v_y", "sideslip"), np.zeros(len(recording)))
-    found = open_loop(vehicle, recording)
-    return {name: found[name] for name in ("v_y", "sideslip")}
+    found = open_loop_of_file(car, recording) or {}
+    return {name: found.get(name, np.zeros(len(recording))) for name in ("v_y", "sideslip")}
 
 
 @eqx.filter_jit

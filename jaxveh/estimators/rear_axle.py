@@ -121,6 +121,10 @@ class RearAxle(AbstractTwoAxles):
     slip_time: jax.Array = positive("s", default=2.0)
     rear_steer: RearSteer | None = None
 
+    def __check_init__(self):
+        if self.rear_steer is not None:
+            check_kind("RearAxle.rear_steer", self.rear_steer, RearSteer)
+
     def shares(self, u) -> tuple[Any, Any]:
         """Lateral force over load of the front axle and of the rear axle, from the sensors: ISO 8855 signs."""
         a, b = self.front_axle_to_cg, self.rear_axle_to_cg
@@ -246,10 +250,12 @@ def report(system: RearAxle, t, x: RearAxleState, u) -> RearAxleReport:
     front, rear = system.loads(u)
     F_f, F_r = system.shares(u)
     at_rear = v_y - system.rear_axle_to_cg * yaw_rate
+    # Below this speed the axle is taken to roll.
+    steer = jnp.where(u.v_x >= rolling_below(system.wheelbase), steer_of(u), 0.0) if system.rear_steer else 0.0
     return RearAxleReport(
         v_y=v_y,
         sideslip=sideslip,
-        slip_angle_rear=steer_of(u) - numerics.arctan2(at_rear, u.v_x + like),
+        slip_angle_rear=steer - numerics.arctan2(at_rear, u.v_x + like),
         F_yf=F_f * front + like,
         F_yr=F_r * rear + like,
         bank=system.bank * x.bank,

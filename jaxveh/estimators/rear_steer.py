@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
+from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.parameter import parameter, positive
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.contract import Need, check_needs
@@ -18,13 +19,16 @@ from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.prepared import AbstractPreparation, prepare
 from jaxveh.estimators.two_axles import LONGEST
 from jaxveh.io import CarSpecification
-from jaxveh.vehicles import AbstractSteering, FourWheelSteering, IndependentSteering, kit
+from jaxveh.vehicles import AbstractSteering, FourWheelSteering, kit
 
 CHANNEL = "steer_rear"
 """rad, positive to the left: the mean angle of both rear wheels."""
 
 OF_WHEELS = ("steer_rl", "steer_rr")
 """The angles of the rear wheels, where each has its own."""
+
+WILD, LONGEST_SPIKE = 0.15, 0.1
+"""rad and s: an angle that differs by more from the last one is a spike, unless it stays for longer."""
 
 
 class RearSteerMemory(NamedTuple):
@@ -41,23 +45,26 @@ class RearSteerMemory(NamedTuple):
 class RearSteer(AbstractPreparation):
     """The angle of the rear wheels in every row, as `steer_rear` (rad).
 
-    It is that of the channel `steer_rear`, or else follows from those of the wheels or from the channel `steer` and the ratio of
-    the `steering`. Between measurements it is held; like the yaw rate it is `late` (s) against the steering sensors. After
-    `two_axles.LONGEST` without a measurement how the car turns says nothing: the yaw rate counts as missing. `offset` (rad): of
-    the channel `steer` when the car runs straight.
+    It is that of the channel `steer_rear`, else the mean of `steer_rl` and `steer_rr`, else, where the rear wheels are steered in
+    a ratio, that of `steer` less its `offset` (rad), or of `steering_wheel` over the steering's `wheel_ratio` (-). Spikes count
+    as missing (`WILD`). Between measurements the angle is held; like the yaw rate it is `late` (s) against the steering sensors.
+    After `two_axles.LONGEST` without a measurement how the car turns says nothing: the yaw rate counts as missing, too.
     """
 
     steering: AbstractSteering
     offset: jax.Array = parameter("rad", scale=0.02, default=0.0)
     late: jax.Array = positive("s", default=0.025)
+    wheel_ratio: jax.Array | None = positive("-", default=None)
+
+    @property
+    def alternatives(self) -> tuple[tuple[str, ...], ...]:
+        """The channels of which one group is enough, the best first."""
+        by_ratio = (("steer",), *((("steering_wheel",),) if self.wheel_ratio is not None else ()))
+        return ((CHANNEL,), OF_WHEELS, *(by_ratio if isinstance(self.steering, FourWheelSteering) else ()))
 
     @property
     def more(self):
-        if isinstance(self.steering, FourWheelSteering):
-            return Need("steer", "rad"), Need(CHANNEL, "rad", optional=True)
-        if isinstance(self.steering, IndependentSteering):
-            return tuple(Need(name, "rad") for name in OF_WHEELS)
-        return (Need(CHANNEL, "rad"),)
+        return tuple(Need(name, "rad", optional=True) for names in self.alternatives for name in names)
 
     @property
     def channels(self):
@@ -76,7 +83,8 @@ class RearSteer(AbstractPreparation):
         dt = t - memory.t
         speed = _speed_in(values, memory.speed)
         measured = self._measured(values, speed)
-        there = ~jnp.isnan(measured)
+        spike = (jnp.abs(measured - memory.raw) > WILD) & (memory.silence + dt < LONGEST_SPIKE)
+        there = ~jnp.isnan(measured) & ~spike
         raw = jnp.where(there, measured, memory.raw)
         silence = jnp.where(there, 0.0, memory.silence + dt)
         # A Pade delay, the all-pass `2 / (1 + s late / 2) - 1`, with a bilinear low-pass filter, as that of the steer.
@@ -90,20 +98,35 @@ class RearSteer(AbstractPreparation):
 
     def _measured(self, values, speed) -> Any:
         """The angle (rad) in this row, NaN where it is not measured."""
-        if isinstance(self.steering, IndependentSteering):
-            return 0.5 * sum(values[name] for name in OF_WHEELS)
-        if not isinstance(self.steering, FourWheelSteering):
-            return values[CHANNEL]
-        by_ratio = self.steering.ratio(speed) * (values["steer"] - self.offset)
-        told = values.get(CHANNEL, jnp.full_like(speed, jnp.nan))
-        return jnp.where(jnp.isnan(told), by_ratio, told)
+        heard = lambda name: values.get(name, jnp.full_like(speed, jnp.nan))
+
+        def by_ratio(angle):
+            # Without this replacement the derivatives by ratio and speed would be NaN even where the product is not used.
+            there = ~jnp.isnan(angle)
+            product = self.steering.ratio(speed) * (jnp.where(there, angle, 0.0) - self.offset)
+            return jnp.where(there, product, jnp.nan)
+
+        found = [heard(CHANNEL), 0.5 * (heard(OF_WHEELS[0]) + heard(OF_WHEELS[1]))]
+        if isinstance(self.steering, FourWheelSteering):
+            wheel = jnp.nan if self.wheel_ratio is None else heard("steering_wheel") / self.wheel_ratio
+            found.append(by_ratio(jnp.where(jnp.isnan(heard("steer")), wheel, heard("steer"))))
+        best = found[-1]
+        for value in reversed(found[:-1]):
+            best = jnp.where(jnp.isnan(value), best, value)
+        return best
 
 
 def _speed_in(values: dict[str, Any], last: Any) -> Any:
-    """The size of the speed in this row (m/s): along the car, that of the wheels or over ground, or else the last one."""
-    for name in ("speed", *kit.wheel_names("wheel_speed"), "v_x"):
-        value = values.get(name, jnp.nan)
-        last = jnp.where(jnp.isnan(value), last, jnp.abs(value))
+    """The size of the speed in this row (m/s): along the car, the median of the wheels, or over ground; or else the last one."""
+    nothing = jnp.full_like(last, jnp.nan)
+    wheels = jnp.stack([values.get(name, nothing) for name in kit.wheel_names("wheel_speed")])
+    count = jnp.sum(~jnp.isnan(wheels))
+    ordered = jnp.sort(jnp.where(jnp.isnan(wheels), jnp.inf, wheels))
+    middle = jnp.where(count > 0, ordered[jnp.maximum(count - 1, 0) // 2], jnp.nan)
+    for value in (values.get("speed", nothing), middle, values.get("v_x", nothing)):
+        there = ~jnp.isnan(value)
+        # Without this replacement the derivative would be NaN even where the value is not used.
+        last = jnp.where(there, jnp.abs(jnp.where(there, value, 0.0)), last)
     return last
 
 
@@ -111,7 +134,8 @@ def rear_steer_of(car: CarSpecification) -> RearSteer | None:
     """How the rear wheels of a car's file are steered; None where they are not."""
     if car.steers_front_alone:
         return None
-    return RearSteer(kit.steering_of(car), car.steer_offset or 0.0, max(unit_delay(car), SHORTEST_DELAY))
+    late = max(unit_delay(car), SHORTEST_DELAY)
+    return RearSteer(kit.steering_of(car), car.steer_offset or 0.0, late, car.steering_ratio)
 
 
 def with_rear_steer(method: AbstractMethod, car: CarSpecification) -> AbstractMethod:
@@ -120,12 +144,33 @@ def with_rear_steer(method: AbstractMethod, car: CarSpecification) -> AbstractMe
     return method if steered is None else prepare(method, steered)
 
 
+def check_rear_angle(who: str, tree: Any, recording: Recording) -> None:
+    """Raise `InputError` for a log that does not tell the angle of the rear wheels that a `RearSteer` in a tree needs."""
+    is_one = lambda node: isinstance(node, RearSteer)
+    for one in filter(is_one, jax.tree.leaves(tree, is_leaf=is_one)):
+        if not any(all(_told(recording, name) for name in names) for names in one.alternatives):
+            others = " or ".join(" and ".join(names) for names in one.alternatives)
+            raise InputError(
+                f"{who}: {CHANNEL} (rad) is missing from the log, but the car's file says that the rear wheels are steered; "
+                f"{others} must have values. Name the columns in a channel map, or leave the steering out of the file if the "
+                "rear wheels stay straight."
+            )
+
+
+def _told(recording: Recording, name: str) -> bool:
+    """Whether a log has a value of a channel, as far as that can be seen."""
+    there = name in recording
+    return there and (not is_concrete(recording[name]) or bool(np.isfinite(np.asarray(recording[name])).any()))
+
+
 def with_rear_angle(who: str, rear_steer: RearSteer | None, recording: Recording) -> Recording:
-    """The recording with the angle of the rear wheels in every row, and no yaw rate where it is unknown; the recording itself for
-    a car that does not steer them. **Raises** as `check_needs`."""
+    """The recording with the angle of the rear wheels in every row, and no yaw rate where it is unknown; without that angle for a
+    car that does not steer them. **Raises** as `check_needs` and `check_rear_angle`."""
     if rear_steer is None:
-        return recording
-    check_needs(who, rear_steer.more, recording)
+        return recording.without(CHANNEL) if CHANNEL in recording else recording
+    check_rear_angle(who, rear_steer, recording)
+    present = tuple(need for need in rear_steer.more if need.channel in recording)
+    check_needs(who, tuple(need._replace(optional=False) for need in present), recording)
     absent = {name: np.full(len(recording), np.nan) for name in rear_steer.channels if name not in recording}
     return clean_recording(rear_steer, recording.replace(**absent))
 

@@ -123,7 +123,10 @@ def calibrate(
         raise InputError(f"sideslip: uses = {uses}: must be one reference; v_y and sideslip hold the same information.")
     recordings, spans = spans_of(NAME, recording, SHORTEST, "corners")
     for one in recordings:
-        _check_measured(one, uses)
+        check_needs(NAME, (*needs, *(Need(name, REFERENCES[name]) for name in uses)), one)
+    recordings = [with_rear_angle(NAME, car_of(car).rear_steer, one) for one in recordings]
+    for one in recordings:
+        _check_measured(one)
     fit = lambda **options: _fit(car, recordings, spans, filter or Extended(), uses, progress, options)
     found = fit()
     late = a_y_delay(fitted_car(found, car), car, recordings) if isinstance(car, CarSpecification) else 0.0
@@ -136,8 +139,7 @@ def _fit(
 ) -> Calibration:  # fmt: skip
     """The calibration that `calibrate` returns, with options of `model`."""
     start = model(car, **options)
-    steered = [with_rear_angle(NAME, start.system.rear_steer, one) for one in recordings]
-    seen = [on_time(_seen(one, uses), start.system) for one in steered]
+    seen = [on_time(_seen(one, uses), start.system) for one in recordings]
     seen = [at_centre(car, one) for one in seen] if uses else seen
     logs = coarse_logs(seen, _wheelbase(start))
     stood = offsets_at_standstill(seen, _wheelbase(start))
@@ -160,8 +162,7 @@ def _fit(
     return Calibration(NAME, fit, spans, weight, validation, start_of(car, options))
 
 
-def _check_measured(recording: Recording, uses: tuple[str, ...]) -> None:
-    check_needs(NAME, (*needs, *(Need(name, REFERENCES[name]) for name in uses)), recording)
+def _check_measured(recording: Recording) -> None:
     if not is_measured(recording, "yaw_rate"):
         raise InputError("sideslip: yaw_rate (rad/s) is NaN in every row: there is nothing to calibrate on.")
     if not is_measured(recording, "a_y"):

@@ -9,11 +9,10 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Score, score_band
-from jaxveh.estimators.linear_baseline import open_loop
+from jaxveh.estimators.linear_baseline import open_loop_of_file
 from jaxveh.estimators.rear_axle import RearAxle
 from jaxveh.filters import Estimate, SmoothedEstimate
-from jaxveh.io import CarSpecification, with_road_steer
-from jaxveh.vehicles import from_specification
+from jaxveh.io import CarSpecification
 
 TOGETHER = 0.1
 """Share of the rarer channel's rows; below it, two channels do not share a clock."""
@@ -68,11 +67,10 @@ def score(
     **Returns** by name the numbers of `diagnostics.Score`, for sideslip in degrees (`sideslip_rmse_deg`) and for v_y in m/s:
     the error as measured, its constant part and the rest (an INS that is turned by half a degree against the car shows this
     angle in every row), the largest error, coverage of the bands, CRPS; the errors of the baseline as
-    `open_loop_sideslip_...`, if there is a `steer`; `rows` and `least_speed`.
+    `open_loop_sideslip_...`, if the angles of the road wheels were measured; `rows` and `least_speed`.
 
     **Raises** `InputError` if no row is left.
     """
-    recording = with_road_steer(car, recording)
     v_y, v_x = np.asarray(recording["v_y"]), np.asarray(recording["v_x"])
     floor = least_speed_of(car) if least_speed is None else least_speed
     ahead = _reference_ahead(car)
@@ -87,8 +85,8 @@ def score(
     stds = np.degrees(np.asarray(found.std.sideslip)), np.asarray(found.std.v_y)
     sideslip = score_band(degrees(v_y), degrees(mean), stds[0], fast)
     named = _named("sideslip", "_deg", sideslip) | _named("v_y", "", score_band(v_y, mean, stds[1], fast))
-    if is_measured(recording, "steer"):
-        baseline = open_loop(from_specification(car), recording)
+    baseline = open_loop_of_file(car, recording)
+    if baseline is not None:
         plain = score_band(degrees(v_y), degrees(there(baseline["v_y"], baseline)), which=fast)
         told = _named("open_loop_sideslip", "_deg", plain)
         named |= {name: value for name, value in told.items() if not np.isnan(value)}

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import away_from_zero
 from jaxveh.estimators.car_file import USUAL_ROLL_GRADIENT, numbers_in
+from jaxveh.estimators.rear_steer import rolls_across
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 from jaxveh.vehicles import kit as vehicles
@@ -80,10 +81,11 @@ class Sliding(eqx.Module):
         speeds = jnp.stack([heard[f"wheel_speed_{at}"] for at in vehicles.CORNERS])
         there = ~jnp.isnan(speeds)
         fast, turn = jnp.abs(away_from_zero(v_x)), heard["yaw_rate"]
-        # Outer wheels run on wider circles than inner ones, front wheels on wider circles than rear ones.
-        wider = 0.5 * jnp.square(wheelbase * turn) / fast
+        # Outer wheels run on wider circles than inner ones, front wheels on wider circles than straight rear ones.
+        across = rolls_across(heard, v_x)
+        wider, behind = (0.5 * jnp.square(aside) / fast for aside in (wheelbase * turn + across, across))
         beside = self.half_track * turn
-        bend = jnp.stack([wider - beside, wider + beside, -beside, beside])
+        bend = jnp.stack([wider - beside, wider + beside, behind - beside, behind + beside])
         shares = jnp.where(there, speeds - bend, 0.0) / fast
         mean = jnp.sum(shares) / jnp.maximum(jnp.sum(there.astype(shares.dtype)), 1.0)
         beyond = jnp.where(there, shares - mean - usual, 0.0)

@@ -17,27 +17,28 @@ USUAL_MIDDLE_SPEED = 20.0
 def with_road_steer(car: CarSpecification, recording: Recording) -> Recording:
     """Return the recording with `steer` (rad, at the road wheels) and, if the rear wheels of `car` are steered, `steer_rear`.
 
-    If `recording` has no `steer`, it is the mean of `steer_fl` and `steer_fr`, or `steering_wheel` over the `steering_ratio` of
-    `car`. If it has no `steer_rear`, that is the mean of `steer_rl` and `steer_rr`, or for a "four-wheel" steering the file's
-    ratio times `steer` less its offset. The recording is unchanged if nothing is to be added, or what is needed is missing.
+    If `recording` has no `steer`, it is `steering_wheel` over the `steering_ratio` of `car`, or the mean of `steer_fl` and
+    `steer_fr`. If it has no value of `steer_rear`, that is the mean of `steer_rl` and `steer_rr`, or for a "four-wheel" steering
+    the file's ratio times `steer` less its offset. The recording is unchanged if nothing is to be added, or what is needed is
+    missing.
     """
     made: dict[str, Any] = {}
-    given = lambda *names: all(name in recording for name in names)
     values = lambda name: np.asarray(recording[name])
-    if given("steer_fl", "steer_fr"):
-        made["steer"] = 0.5 * (values("steer_fl") + values("steer_fr"))
-    elif given("steering_wheel") and car.steering_ratio is not None:
-        made["steer"] = values("steering_wheel") / car.steering_ratio
+    given = lambda *names: all(name in recording and np.isfinite(values(name)).any() for name in names)
     if "steer" in recording:
-        made = {"steer": values("steer")}
-    if not car.steers_front_alone:
+        made["steer"] = values("steer")
+    elif "steering_wheel" in recording and car.steering_ratio is not None:
+        made["steer"] = values("steering_wheel") / car.steering_ratio
+    elif given("steer_fl", "steer_fr"):
+        made["steer"] = 0.5 * (values("steer_fl") + values("steer_fr"))
+    if not (car.steers_front_alone or given("steer_rear")):
         if given("steer_rl", "steer_rr"):
             made["steer_rear"] = 0.5 * (values("steer_rl") + values("steer_rr"))
         elif car.steering == "four-wheel" and "steer" in made and (given("v_x") or car.rear_steer_ratio_fast is None):
             speed = values("v_x") if given("v_x") else 0.0
             ratio = rear_ratio(car.rear_steer_ratio, car.rear_steer_ratio_fast, car.rear_steer_speed, speed)
             made["steer_rear"] = ratio * (made["steer"] - (car.steer_offset or 0.0))
-    new = {name: one for name, one in made.items() if name not in recording}
+    new = {name: one for name, one in made.items() if name == "steer_rear" or name not in recording}
     return recording.replace(**new) if new else recording
 
 

@@ -67,9 +67,10 @@ def _nothing(quantity: str, settings, model: Any, recording: Any, log: Any) -> A
         told = told_car(settings)
         car = told if isinstance(told, vehicles.SingleTrack) else _single_track(settings, told)
         speed = speed_and_steer(settings["drive"])[0]
-        seen = hold(recording, ("steer", "v_x"))
+        seen = hold(recording, ("steer", "v_x", "steer_rear"))
         v_x = seen["v_x"] if "v_x" in seen else jnp.full((len(seen),), speed)
-        return estimators.open_loop_of(car, seen.time, seen["steer"], v_x)[quantity]
+        rear = (seen["steer_rear"],) if "steer_rear" in seen else ()
+        return estimators.open_loop_of(car, seen.time, seen["steer"], v_x, *rear)[quantity]
     first = jax.tree.map(lambda leaf: leaf[0], model.rows(log))
     return getattr(model.report(first.t, model.prior.mean, first.u), quantity.replace(".", "_"))
 

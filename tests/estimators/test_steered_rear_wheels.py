@@ -3,6 +3,7 @@
 import dataclasses
 
 import banked_drives
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import method_logs
@@ -14,7 +15,7 @@ from jaxveh import InputError, Recording, diagnostics, estimators, io, vehicles
 from jaxveh.estimators import kit
 from jaxveh.estimators.linear_baseline import open_loop, open_loop_of
 from jaxveh.estimators.method_of_car import TURNING, method_of
-from jaxveh.estimators.rear_steer import RearSteer, rear_steer_of, with_rear_angle
+from jaxveh.estimators.rear_steer import rear_steer_of, with_rear_angle
 
 PLAIN = method_logs.CAR
 RATIO = -0.3
@@ -167,30 +168,96 @@ def prepared_rows(car, log):
     return with_rear_angle("here", rear_steer_of(car), log)
 
 
-def test_the_angle_is_the_measured_one_or_that_of_the_wheels_or_of_the_ratio():
+LAW = dataclasses.replace(
+    STEERED["four-wheel"], rear_steer_ratio_fast=0.2, rear_steer_speed=15.0, steer_offset=0.01, steering_ratio=16.0
+)
+WHEELS = ("steer_rl", "steer_rr")
+TELLING = [
+    *[
+        (car, (*more, *names))
+        for car in (REAR, STEERED["independent"], LAW)
+        for names in (("steer_rear",), WHEELS)
+        for more in ((), ("steer",))
+    ],
+    (LAW, ("steer", "v_x")),
+    (LAW, ("steering_wheel", "v_x")),
+]
+"""A car's file, and channels that tell the angle of its rear wheels: the measured angle, that of the wheels, or the ratio."""
+
+
+@pytest.mark.parametrize(("car", "names"), TELLING)
+def test_the_angle_is_the_measured_one_or_that_of_the_wheels_or_of_the_ratio(car, names):
     made = method_logs.channels(rear=TURNED)
-    slow = dataclasses.replace(
-        STEERED["four-wheel"], rear_steer_ratio_fast=0.2, rear_steer_speed=15.0, steer_offset=0.01
+    by_ratio = vehicles.kit.steering_of(LAW).ratio(made["v_x"]) * (made["steer"] - 0.01)
+    wanted = by_ratio if "v_x" in names else made["steer_rear"]
+    log = Recording(made["time"], {name: made[name] for name in (*names, "yaw_rate")})
+    heard = prepared_rows(car, log)
+    shifted = np.interp(made["time"] - float(rear_steer_of(car).late), made["time"], wanted)
+    np.testing.assert_allclose(heard["steer_rear"][10:], shifted[10:], atol=6e-4)
+    np.testing.assert_array_equal(heard["yaw_rate"], made["yaw_rate"])
+    # That of the log is the same without the delay.
+    of_log = io.with_road_steer(car, log)
+    np.testing.assert_allclose(of_log["steer_rear"], wanted, rtol=1e-12, atol=1e-15)
+    # A column without values says nothing.
+    empty = log if "steer_rear" in names else log.replace(steer_rear=np.full(len(log), np.nan))
+    np.testing.assert_array_equal(prepared_rows(car, empty)["steer_rear"], heard["steer_rear"])
+    np.testing.assert_array_equal(io.with_road_steer(car, empty)["steer_rear"], of_log["steer_rear"])
+
+
+def test_spikes_of_the_angle_are_not_heard_and_steps_are():
+    made = method_logs.channels(rear=TURNED)
+    log = Recording(made["time"], {name: made[name] for name in ("steer_rear", "yaw_rate")})
+    raw, heard = np.array(made["steer_rear"]), prepared_rows(REAR, log)["steer_rear"]
+    raw[100] += 0.5
+    np.testing.assert_allclose(prepared_rows(REAR, log.replace(steer_rear=raw))["steer_rear"], heard, atol=0.005)
+    raw[101:] += 0.5
+    stepped = prepared_rows(REAR, log.replace(steer_rear=raw))["steer_rear"]
+    np.testing.assert_allclose(stepped[115:], heard[115:] + 0.5, atol=1e-4)
+
+
+def test_a_car_that_steers_the_front_alone_hears_no_angle():
+    log = drive(estimators.sideslip.needs).replace(steer_rear=np.full(1500, np.nan))
+    assert rear_steer_of(PLAIN) is None and "steer_rear" not in prepared_rows(PLAIN, log)
+    bare = log.without("steer_rear")
+    assert prepared_rows(PLAIN, bare) is bare
+
+
+@pytest.mark.parametrize("kind", STEERED)
+def test_a_log_that_does_not_tell_the_angle_is_refused_before_anything_runs(kind):
+    car, log = STEERED[kind], drive(estimators.sideslip.needs)
+    silent = log.replace(steer_rear=np.full(len(log), np.nan))
+    acts = (
+        lambda one: estimators.sideslip.estimate(car, one),
+        lambda one: estimators.sideslip.calibrate(car, one),
+        lambda one: estimators.sideslip.estimate(car, one, method="rear_axle"),
+        lambda one: estimators.grade.estimate(car, one),
     )
-    law = vehicles.kit.steering_of(slow)
-    by_ratio = law.ratio(made["v_x"]) * (made["steer"] - 0.01)
-    late = rear_steer_of(REAR).late
-    for car, names, wanted in (
-        (REAR, ("steer_rear",), made["steer_rear"]),
-        (STEERED["independent"], ("steer_rl", "steer_rr"), made["steer_rear"]),
-        (slow, ("steer", "v_x"), by_ratio),
-        (slow, ("steer", "steer_rear", "v_x"), made["steer_rear"]),
-    ):
-        log = Recording(made["time"], {name: made[name] for name in (*names, "yaw_rate")})
-        heard = prepared_rows(car, log)
-        shifted = np.interp(made["time"] - float(late), made["time"], wanted)
-        np.testing.assert_allclose(heard["steer_rear"][10:], shifted[10:], atol=2e-4)
-        np.testing.assert_array_equal(heard["yaw_rate"], made["yaw_rate"])
-        # The same as that of the log, which has no delay.
-        if names != ("steer", "steer_rear", "v_x"):
-            of_log = io.with_road_steer(car, log if "steer" in names else log.replace(steer=made["steer"]))
-            np.testing.assert_allclose(of_log["steer_rear"], wanted, rtol=1e-12)
-    assert rear_steer_of(PLAIN) is None and prepared_rows(PLAIN, log) is log
+    for one in (log, silent):
+        for act in acts:
+            with pytest.raises(
+                InputError, match=r"(sideslip|grade): steer_rear \(rad\) is missing from the log, but the car"
+            ):
+                act(one)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("kind", STEERED)
+@pytest.mark.parametrize("gap", [False, True])
+def test_what_is_behind_a_low_pass_is_estimated_and_calibrated_from_any_telling_log(kind, gap):
+    car = dataclasses.replace(STEERED[kind], low_pass=5.0)
+    names = {"rear": ("steer_rear",), "independent": WHEELS, "four-wheel": ("steer",)}[kind]
+    made = method_logs.channels(rows=400, rear=TURNED)
+    if kind == "four-wheel":
+        made |= {"steer_rear": RATIO * made["steer"]}
+    log = Recording(made["time"], {n: made[n] for n in (*[need.channel for need in estimators.sideslip.needs], *names)})
+    log = log.rows(np.flatnonzero((made["time"] < 3.0) | (made["time"] > 3.7))) if gap else log
+    said = estimators.sideslip.estimate(car, log)
+    assert np.isfinite(np.asarray(said.mean.sideslip)).all()
+    if not gap:
+        found = estimators.sideslip.calibrate(car, log)
+        truth = log.replace(v_y=made["v_y"], steer=made["steer"])
+        scored = estimators.sideslip.score(car, estimators.sideslip.estimate(found, log), truth)
+        assert np.isfinite(scored["open_loop_sideslip_rmse_deg"])
 
 
 def test_it_is_held_in_gaps_and_after_long_ones_no_turn_is_heard():
@@ -203,27 +270,42 @@ def test_it_is_held_in_gaps_and_after_long_ones_no_turn_is_heard():
     silent = np.isnan(heard["yaw_rate"])
     assert silent[(made["time"] > 3.35) & (made["time"] < 4.0)].all() and not silent[made["time"] < 3.2].any()
     assert not silent[made["time"] > 4.05].any()
-    never = prepared_rows(REAR, log.replace(steer_rear=np.full(len(log), np.nan)))
-    assert np.isnan(never["yaw_rate"]).all()
 
 
-def test_gradients_float32_and_batches():
-    rear = RearSteer(vehicles.FourWheelSteering(0.2, fast_ratio=-0.1), 0.01, 0.03)
-    time = jnp.arange(50.0) * 0.02
+@pytest.mark.parametrize("car", [REAR, STEERED["independent"], LAW])
+def test_slopes_batches_and_float32_with_gaps(car):
+    made = method_logs.channels(rows=60, rear=TURNED)
+    names = ("steer", "steer_rear", *WHEELS, "steering_wheel", "v_x", "yaw_rate", "wheel_speed_fl", "wheel_speed_rl")
+    values = {name: np.where(np.arange(60) % 3 == 1, np.nan, made[name]) for name in names}
+    if car is LAW:
+        del values["steer_rear"], values["steer_rl"], values["steer_rr"]
+    rear = rear_steer_of(car)
+    numbers, rest = eqx.partition(rear, eqx.is_array)
 
-    def last(rear, steer):
-        memory, heard = rear.first(time[0], {"steer": steer[0], "v_x": time[0] + 10.0, "yaw_rate": time[0]})
-        for k in range(1, 8):
-            memory, heard = rear.next(memory, time[k], {"steer": steer[k], "v_x": time[k] + 10.0, "yaw_rate": time[k]})
-        return heard["steer_rear"]
+    def angles(numbers, values, time):
+        one = eqx.combine(numbers, rest)
+        row = lambda k: {name: value[k] for name, value in values.items()}
+        memory, _ = one.first(time[0], row(0))
 
-    steer = 0.05 * jnp.sin(3.0 * time)
-    slope = jax.grad(lambda r: last(rear.__class__(vehicles.FourWheelSteering(r), 0.01, 0.03), steer))(0.2)
-    step = 1e-5
-    of = lambda r: last(rear.__class__(vehicles.FourWheelSteering(r), 0.01, 0.03), steer)
-    np.testing.assert_allclose(slope, (of(0.2 + step) - of(0.2 - step)) / (2.0 * step), rtol=1e-6)
-    both = jax.vmap(lambda s: last(rear, s))(jnp.stack([steer, 2.0 * steer]))
-    np.testing.assert_allclose(both, [last(rear, steer), last(rear, 2.0 * steer)], rtol=1e-12)
+        def step(memory, k):
+            memory, heard = one.next(memory, time[k], row(k))
+            return memory, heard["steer_rear"]
+
+        return jax.lax.scan(step, memory, jnp.arange(1, 60))[1]
+
+    time, values = jnp.asarray(made["time"]), {name: jnp.asarray(value) for name, value in values.items()}
+    total = lambda numbers, values: jnp.sum(jnp.square(angles(numbers, values, time)))
+    slopes = jax.grad(total, argnums=(0, 1))(numbers, values)
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(slopes))
+    later = eqx.tree_at(lambda r: r.late, numbers, numbers.late + 1e-6)
+    np.testing.assert_allclose(slopes[0].late, (total(later, values) - total(numbers, values)) / 1e-6, rtol=1e-3)
+    alone = angles(numbers, values, time)
+    twice = jax.vmap(lambda by: angles(numbers, values | {"v_x": by * values["v_x"]}, time))(jnp.asarray([1.0, 1.0]))
+    np.testing.assert_allclose(twice, jnp.stack([alone, alone]), rtol=1e-12, atol=1e-15)
+    single = jax.tree.map(lambda leaf: leaf.astype(jnp.float32), (numbers, values, time))
+    found = angles(*single)
+    assert found.dtype == np.float32
+    np.testing.assert_allclose(found, alone, atol=1e-5)
 
 
 def test_the_parts_of_a_prepared_method():
@@ -243,10 +325,14 @@ def test_a_log_is_checked_against_such_a_car():
     assert ("steer_rear", "warning") not in judged(PLAIN, log.replace(steer_rear=0.0 * made["steer_rear"]))
     wrong = judged(REAR, log.replace(steer_rear=-made["steer_rear"]))
     assert {("steer", "note"), ("yaw_rate", "note")} <= wrong and not {("steer", "note"), ("yaw_rate", "note")} & found
-    with pytest.raises(
-        InputError, match=r"check_log: steer_rear \(rad\) is missing from the log, but the car's file has"
-    ):
-        diagnostics.check_log(log.without("steer_rear"), car=REAR)
+    missing = [one for one in diagnostics.check_log(log.without("steer_rear"), car=REAR) if one.channel == "steer_rear"]
+    assert [one.severity for one in missing] == ["error"] and "is missing, but the car's file has" in missing[0].message
+    wheels = log.without("steer_rear").replace(steer_rl=made["steer_rl"], steer_rr=made["steer_rr"])
+    assert ("steer_rl", "warning") in judged(PLAIN, wheels)
+    assert not {severity for _, severity in judged(REAR, wheels)} & {"error"}
+    spike = np.zeros(3000)
+    spike[100] = 0.3
+    assert ("steer_rear", "warning") not in judged(PLAIN, log.replace(steer_rear=spike))
 
 
 def test_the_baseline_drives_with_all_four_wheels():
@@ -272,3 +358,7 @@ def test_the_baseline_drives_with_all_four_wheels():
     told = estimators.sideslip.do_nothing(REAR, log)
     assert np.abs(told["sideslip"] - estimators.sideslip.do_nothing(PLAIN, log)["sideslip"]).max() > 1e-3
     assert not estimators.sideslip.do_nothing(REAR, log.select(["steer", "v_x"]))["sideslip"].any()
+    slower = log.replace(steer_rear=np.where(np.arange(100) % 5 == 0, 0.25 * steer, np.nan))
+    for one in (REAR, STEERED["independent"]):
+        found = estimators.sideslip.do_nothing(one, slower)
+        np.testing.assert_allclose(found["sideslip"], told["sideslip"], atol=1e-3)

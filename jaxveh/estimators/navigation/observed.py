@@ -43,7 +43,8 @@ def observation(system: Navigator, t, x, u) -> Any:
     if parts.wheels:
         # Wheel speeds have no sign; driven wheels turn faster.
         slips = x.wheel_scale + x.wheel_slip * u.a_x
-        seen["wheel_speed"] = (1.0 + slips) * numerics.sqrt(jnp.square(x.v_x) + 1e-4)
+        rolls = numerics.sqrt(jnp.square(x.v_x) + 1e-4)
+        seen["wheel_speed"] = (1.0 + slips) * (rolls / numerics.cos(rear_steer(u)) if parts.rear_steer else rolls)
     if parts.axle == "none":
         seen[ROLLS] = (
             x.v_y - system.rear_axle_to_cg * (u.yaw_rate - x.bias_yaw_rate) - x.v_x * numerics.tan(rear_steer(u))
