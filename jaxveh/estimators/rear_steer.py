@@ -12,6 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.parameter import parameter, positive
 from jaxveh._core.recording import Recording
+from jaxveh.estimators.body_motion import steer_heard
 from jaxveh.estimators.contract import Need, check_needs
 from jaxveh.estimators.delays import SHORTEST_DELAY, unit_delay
 from jaxveh.estimators.live import clean_recording
@@ -108,8 +109,8 @@ class RearSteer(AbstractPreparation):
 
         found = [heard(CHANNEL), 0.5 * (heard(OF_WHEELS[0]) + heard(OF_WHEELS[1]))]
         if isinstance(self.steering, FourWheelSteering):
-            wheel = jnp.nan if self.wheel_ratio is None else heard("steering_wheel") / self.wheel_ratio
-            found.append(by_ratio(jnp.where(jnp.isnan(heard("steer")), wheel, heard("steer"))))
+            told = {name: heard(name) for name in ("steer", "steering_wheel")}
+            found.append(by_ratio(steer_heard(told, self.wheel_ratio)))
         best = found[-1]
         for value in reversed(found[:-1]):
             best = jnp.where(jnp.isnan(value), best, value)
