@@ -129,8 +129,8 @@ def _a_y_expected(log: LogView, car: CarSpecification) -> np.ndarray:
     if not known.any():
         return np.full(known.shape, np.nan)
     # Bridged: the angle of the rear wheels is differentiated.
-    filled = [np.interp(log.grid, log.grid[known], values[known]) for values in seen]
-    return np.where(known, a_y_from_yaw_rate(car, *filled, log.step), np.nan)
+    yaw_rate, rear, v_x = (np.interp(log.grid, log.grid[known], values[known]) for values in seen)
+    return np.where(known, a_y_from_yaw_rate(car, yaw_rate, rear, v_x, log.step), np.nan)
 
 
 def a_y_delay(recording: Recording, car: CarSpecification) -> Delay | None:

@@ -99,7 +99,10 @@ def fit_rear_axle(
     if int(best.result) != 0:
         warn(f"sideslip: the fit ended after {int(best.steps)} steps ({best.reason}); its last values are used.")
     spread = np.asarray(problem.spread)
-    apart = disagreement(*(_best(half, starts) for half in _halves(problem)), spread) if halves else 1.0
+    apart = 1.0
+    if halves:
+        one, other = (_best(half, starts) for half in _halves(problem))
+        apart = disagreement(one, other, spread)
     return _widened(best, spread, OVERCONFIDENCE * max(apart, 1.0))
 
 

@@ -56,10 +56,12 @@ def test_a_method_includes_their_angle_or_refuses_the_car_and_names_those_that_d
 
 
 QUICK = (("bank", "filter", "rear"), ("grade", "filter", "four-wheel"))
-"""Those of the default run."""
+"""Those of which CI runs a fifth."""
 
 KNOWING = [
-    pytest.param(quantity, name, kind, marks=[] if (quantity, name, kind) in QUICK else [pytest.mark.full])
+    pytest.param(
+        quantity, name, kind, marks=pytest.mark.thorough if (quantity, name, kind) in QUICK else pytest.mark.full
+    )
     for quantity, module in QUANTITIES.items()
     for name, entry in module.METHODS.items()
     if entry.any_steering

@@ -137,7 +137,9 @@ class Learner(AbstractMethod):
         steering = belief_of(Steering, {"offset": self.steer_offset}, stds, t)
         turning = belief_of(Turning, {}, {"stiffness": self.stiffness_spread, "inertia": self.inertia_spread}, t)
         start = {name: getattr(self, name) + zero for name in UNITS}
-        memory = LearnerMemory(leaning, *[zero] * 8, steering, turning, start, zero)
+        memory = LearnerMemory(
+            leaning, zero, zero, zero, zero, zero, zero, zero, zero, steering, turning, start, zero,
+        )  # fmt: skip
         return self._next(memory, leaning, said, zero, values)
 
     def next(self, memory, t, values):
