@@ -10,6 +10,7 @@ from jaxveh import InputError, Recording
 from jaxveh.cli import sideslip
 from jaxveh.cli.console import results
 from jaxveh.cli.output import make_folder
+from jaxveh.estimators import open_loop_of_file
 from jaxveh.io import CarSpecification
 
 OPEN_LOOP = "open-loop linear model"
@@ -19,7 +20,7 @@ def beside(car: CarSpecification, seen: Recording, truth: str | None) -> tuple[A
     """Return the truth by name (None if there is none), and the curves beside it: the baseline, if there are truth and steer."""
     if truth is None:
         return None, {}
-    baseline = sideslip.open_loop(car, seen)
+    baseline = open_loop_of_file(car, seen)
     return sideslip.truth_of(car, seen, truth), {} if baseline is None else {OPEN_LOOP: baseline}
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from jaxveh import InputError, Recording, estimators, filters, vehicles
 from jaxveh._core.progress import Progress
 from jaxveh.estimators import Calibration, sideslip
-from jaxveh.io import CarSpecification, with_road_steer
+from jaxveh.io import CarSpecification
 from jaxveh.io import kit as io
 
 NAME = sideslip.NAME
@@ -112,15 +112,6 @@ def score(
 ) -> dict[str, float]:
     """Return RMSEs and the coverage of the 95 % band, and those of the open-loop linear model, by the names of the JSON file."""
     return sideslip.score(car, found, _reference(seen, name))
-
-
-def open_loop(car: CarSpecification, seen: Recording) -> dict[str, np.ndarray] | None:
-    """Return v_y and sideslip of a linear single track driven by its wheels' angles and speed alone, by name (T,); None if the
-    log does not have them."""
-    angles = ("steer",) if car.steers_front_alone else ("steer", "steer_rear")
-    seen = with_road_steer(car, seen)
-    told = all(name in seen and np.isfinite(np.asarray(seen[name])).any() for name in angles)
-    return sideslip.do_nothing(car, seen) if told else None
 
 
 def fitted_parameters(calibration: Calibration | None) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.comparison import Compared, MethodScore, compare, score_answers
 from jaxveh.estimators.contract import Calibration, Span
 from jaxveh.estimators.exchange import Exchange
-from jaxveh.estimators.linear_baseline import open_loop, open_loop_of
+from jaxveh.estimators.linear_baseline import open_loop, open_loop_of, open_loop_of_file
 from jaxveh.estimators.live import Live, LiveAnswer, LiveBelief
 from jaxveh.estimators.method import AbstractMethod, Answer, Answers, Filtered, LiveMethod
 from jaxveh.estimators.method_of_car import MethodOfCar
@@ -61,6 +61,7 @@ __all__ = [
     "observe",
     "open_loop",
     "open_loop_of",
+    "open_loop_of_file",
     "predict_measurements",
     "read_calibration",
     "rear_axle_model",

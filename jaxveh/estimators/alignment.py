@@ -75,8 +75,8 @@ def on_time(recording: Recording, system: RearAxle) -> Recording:
     moved = {name: _earlier(recording, name, by) for name, by in late.items() if by}
     if "steer_rear" in moved:
         # An input, which every row must have.
-        time = np.asarray(recording.time, float)
-        moved["steer_rear"] = np.interp(time + late["steer_rear"], time, np.asarray(recording["steer_rear"], float))
+        time, angle = np.asarray(recording.time, float), np.asarray(recording["steer_rear"])
+        moved["steer_rear"] = np.interp(time + late["steer_rear"], time, angle).astype(angle.dtype)
     return recording.replace(**moved)
 
 

@@ -20,6 +20,8 @@ from jaxveh.io import CarSpecification, with_road_steer
 from jaxveh.statespace import Propagate, Row
 from jaxveh.tyres import AbstractDynamicTyre, Linear
 from jaxveh.vehicles import (
+    AbstractSteering,
+    AbstractVehicle,
     FrontSteering,
     IndependentSteering,
     RearSteering,
@@ -28,7 +30,6 @@ from jaxveh.vehicles import (
     linear,
     linear_single_track,
 )
-from jaxveh.vehicles import kit as vehicles
 
 
 def _derivatives(car: SingleTrack, t, x, u):
@@ -47,15 +48,16 @@ def open_loop(car: Any, recording: Recording) -> dict[str, np.ndarray]:
     of each wheel. The tyres have the axles' own cornering stiffnesses at their static loads, without load transfer: `car` is a
     single track, or any car of which `vehicles.linear_single_track` makes one. **Returns** by name, (T,) each: `v_y` (m/s),
     `yaw_rate` (rad/s), `sideslip` (rad). **Raises** `InputError` for channels that are missing or have gaps, or for a car without
-    axles.
+    axles or one that is steered by something else.
     """
-    asked = tuple(Need(name, "rad", throughout=True) for name in getattr(car, "steering", FrontSteering()).inputs)
+    asked = tuple(Need(name, "rad", throughout=True) for name in _steering_of(car).inputs)
     check_needs("open_loop", (*asked, SPEED), recording)
-    angles = {need.channel: recording[need.channel] for need in asked}
-    if len(angles) == len(vehicles.CORNERS):
-        fl, fr, rl, rr = angles.values()
-        angles = {"steer": 0.5 * (fl + fr), "steer_rear": 0.5 * (rl + rr)}
-    time, inputs = recording.time, (angles["steer"], recording["v_x"], angles.get("steer_rear"))
+    angles = [recording[need.channel] for need in asked]
+    if isinstance(_steering_of(car), IndependentSteering):
+        fl, fr, rl, rr = angles
+        angles = [0.5 * (fl + fr), 0.5 * (rl + rr)]
+    steer, *rear = angles
+    time, inputs = recording.time, (steer, recording["v_x"], *rear)
     length = common_length(len(recording))
     # So that float32 resolves the steps of a log whose stamps count from 1970.
     time = lengthen_time(np.asarray(time) - np.asarray(time)[0], length)
@@ -67,8 +69,21 @@ def _linear_car(car: Any) -> SingleTrack:
     """The single track on linear tyres of a car, whose stiffness does not depend on the load. An axle whose wheels have an angle
     each has their mean."""
     plain = _on_linear_tyres(car)
-    each = isinstance(plain.steering, IndependentSteering)
+    each = isinstance(_steering_of(car), IndependentSteering)
     return dataclasses.replace(plain, steering=RearSteering()) if each else plain
+
+
+def _steering_of(car: Any) -> AbstractSteering:
+    """The steering of a car, which may be inside another (as `vehicles.linear_single_track` looks for it)."""
+    while isinstance(inner := getattr(car, "vehicle", None), AbstractVehicle):
+        car = inner
+    steering = getattr(car, "steering", FrontSteering())
+    if steering.inputs not in (("steer",), RearSteering.inputs, IndependentSteering.inputs):
+        raise InputError(
+            f"open_loop: car.steering = {word_for(steering)}: needs {', '.join(steering.inputs)}; must be a steering whose "
+            f"inputs are steer, {' and '.join(RearSteering.inputs)}, or {', '.join(IndependentSteering.inputs)}."
+        )
+    return steering
 
 
 def _on_linear_tyres(car: Any) -> SingleTrack:
@@ -113,7 +128,9 @@ def open_loop_of(car: Any, time, steer, v_x, steer_rear=None) -> dict[str, jax.A
     inputs = {"steer": jnp.asarray(steer), "v_x": jnp.asarray(v_x)}
     if "steer_rear" in linear_car.steering.inputs:
         if steer_rear is None:
-            raise InputError(f"open_loop_of: car.steering = {word_for(car.steering)}: needs steer_rear (rad) as well.")
+            raise InputError(
+                f"open_loop_of: car.steering = {word_for(_steering_of(car))}: needs steer_rear (rad) as well."
+            )
         inputs["steer_rear"] = jnp.asarray(steer_rear)
     states = _drive(linear_car, Row(jnp.asarray(time), record("Inputs", inputs), ()))
     return {

@@ -176,9 +176,9 @@ def with_rear_angle(who: str, rear_steer: RearSteer | None, recording: Recording
     return clean_recording(rear_steer, recording.replace(**absent))
 
 
-def rear_angle(values: dict[str, Any]) -> Any:
-    """The angle of the rear wheels in a prepared row (rad); 0 in the rows of a car that does not steer them."""
-    return values.get(CHANNEL, 0.0)
+def rear_angle(values: dict[str, Any], none: Any = 0.0) -> Any:
+    """The angle of the rear wheels in a prepared row (rad); `none`, a zero, in the rows of a car that does not steer them."""
+    return values.get(CHANNEL, none)
 
 
 def rolls_across(values: dict[str, Any], v_x: Any) -> Any:

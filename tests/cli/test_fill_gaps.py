@@ -1,11 +1,12 @@
 """`--fill`: gaps of any place and length in the inputs, drawn at random, against NumPy's interpolation."""
 
+import dataclasses
 import re
 
 import numpy as np
 import pytest
 
-from jaxveh import InputError, Recording, estimators
+from jaxveh import InputError, Recording, estimators, vehicles
 from jaxveh.cli import blanking
 from jaxveh.cli.quantity_options import FILLED, QUANTITIES, inputs_of
 
@@ -104,3 +105,19 @@ def test_without_methods_the_recommended_ones_are_filled():
     assert set(FILLED) <= set(every)
     for name, module in QUANTITIES.items():
         assert set(inputs_of((name,), (module.RECOMMENDED,), estimators.kit.FULL_CAR)) <= set(every)
+
+
+@pytest.mark.parametrize("steering", vehicles.kit.STEERINGS)
+def test_the_angles_of_steered_rear_wheels_are_read_seen_and_filled(steering):
+    ratio = {"rear_steer_ratio": -0.2} if steering == "four-wheel" else {}
+    plain = dataclasses.replace(estimators.kit.FULL_CAR, **dict.fromkeys(("rear_steer_ratio", "rear_steer_ratio_fast")))
+    car = dataclasses.replace(plain, steering=steering, **ratio)
+    read = set(blanking.read_for(car))
+    needs = {need.channel for need in estimators.sideslip.METHODS["rear_axle"].make(car).needs} - {"steering_wheel"}
+    assert needs <= read <= set(blanking.SEEN)
+    angles = needs & {"steer", *blanking.REAR_ANGLES}
+    assert bool(angles) == (not car.steers_front_alone) and angles <= set(FILLED)
+    missing = np.arange(ROWS) % 3 == 1
+    log = log_with(np.zeros(ROWS, bool)).replace(**{name: np.where(missing, np.nan, 0.1) for name in angles})
+    filled = blanking.fill_gaps(log, 0.3)
+    assert all(np.isfinite(np.asarray(filled[name])[:-1]).all() for name in angles)

@@ -171,17 +171,10 @@ def test_a_car_that_stands_with_its_wheels_turned_still_feels_the_bank():
     assert abs(found.mean.v_y[-1]) < 0.05 and found.known.bank[-1]
 
 
-@pytest.mark.parametrize(
-    ("changes", "reads"),
-    [({"steering_ratio": None}, {"steer"}), ({"front_cornering_stiffness": None, "front": None}, set())],
-)
-def test_a_file_that_tells_too_little_of_the_steer_leaves_it_out(changes, reads):
-    if "front" in changes:
-        # A file always has stiffnesses; a method of one's own may leave the check out.
-        method = dataclasses.replace(bank.METHODS["filter"].make(CAR), steering=None)
-    else:
-        method = bank.METHODS["filter"].make(dataclasses.replace(CAR, **changes))
-    assert {need.channel for need in method.needs} & {"steer", "steering_wheel"} == reads
+def test_a_file_without_the_ratio_takes_the_steer_of_the_road_wheels_alone():
+    method = bank.METHODS["filter"].make(dataclasses.replace(CAR, steering_ratio=None))
+    read = {need.channel for need in method.needs}
+    assert "steer" in read and "steering_wheel" not in read
     found = bank.estimate(method, banked_circle(method.needs)[0])
     assert found.known.bank[-1]
 

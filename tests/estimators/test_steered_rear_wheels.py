@@ -16,6 +16,7 @@ from jaxveh.estimators import kit
 from jaxveh.estimators.linear_baseline import open_loop, open_loop_of
 from jaxveh.estimators.method_of_car import TURNING, method_of
 from jaxveh.estimators.rear_steer import rear_steer_of, with_rear_angle
+from jaxveh.estimators.sliding import Sliding
 
 PLAIN = method_logs.CAR
 RATIO = -0.3
@@ -73,7 +74,8 @@ TRUTHS = {
     "yaw": 0.003, "yaw_inertia": 50.0, "steer_offset": 0.0005,
 }  # fmt: skip
 """What the drive is made of, and an error that is allowed beside that for a car with straight rear wheels, RMS in the last third
-of 30 s. Methods that are not told the angle of the rear wheels, which is 0.06 rad RMS, are off by far more."""
+of 30 s. Without the angle of the rear wheels, which is 0.06 rad RMS, sideslips and lateral speeds are off by as much; the bank,
+whose gate then leaves the slip angle out, is not."""
 
 
 def truth_of(name, made):
@@ -117,7 +119,7 @@ def test_a_calibrated_car_is_as_right_and_says_the_same_live_and_from_its_file(t
     np.testing.assert_array_equal(again.mean.sideslip, estimate.mean.sideslip)
     fitted = sideslip.fitted_car(found, REAR, recording=log)
     assert fitted.steering == "rear"
-    np.testing.assert_allclose(fitted.front_cornering_stiffness, PLAIN.front_cornering_stiffness, rtol=0.25)
+    np.testing.assert_allclose(fitted.front_cornering_stiffness, PLAIN.front_cornering_stiffness, rtol=0.05)
     causal, live, belief = sideslip.estimate(found, log, smoothed=False), sideslip.live(found), None
     for k in range(40):
         row = float(log.time[k]), {name: float(log[name][k]) for name in log.names}
@@ -316,6 +318,34 @@ def test_the_parts_of_a_prepared_method():
     assert [need.channel for need in method.needs].count("yaw_rate") == 1
 
 
+def rolling_wheels(front, rear, v_x):
+    """The speeds (m/s) of wheels that roll on their circles, turned by these angles (rad), and the yaw rate."""
+    yaw_rate = v_x * (np.tan(front) - np.tan(rear)) / PLAIN.wheelbase
+    speeds = [np.hypot(v_x - s * 0.75 * yaw_rate, v_x * np.tan(angle)) for angle in (front, rear) for s in (1, -1)]
+    return dict(zip(vehicles.kit.wheel_names("wheel_speed"), speeds, strict=True)), yaw_rate
+
+
+@pytest.mark.parametrize(
+    ("front", "rear", "v_x"), [(0.35, 0.0, 5.0), (0.0, 0.35, 5.0), (0.25, -0.25, 4.0), (0.1, 0.1, 12.0)]
+)
+def test_wheels_of_a_tight_bend_do_not_slide_wherever_they_point(front, rear, v_x):
+    wheels, yaw_rate = rolling_wheels(front, rear, v_x)
+    heard = {"dt": 0.01, "a_y": v_x * yaw_rate, "yaw_rate": yaw_rate, **wheels} | ({"steer_rear": rear} if rear else {})
+    heard = {name: jnp.asarray(value) for name, value in heard.items()}
+    sliding, time = Sliding(), jnp.asarray(0.0)
+    doubt = sliding.next(sliding.start(time), heard, jnp.asarray(v_x), jnp.asarray(0.0), PLAIN.wheelbase).doubt
+    assert float(doubt.along) < 0.03
+
+
+def test_the_angle_of_a_standing_car_s_wheels_is_no_slip_angle():
+    made = method_logs.channels(speed=0.0)
+    log = Recording(made["time"], {need.channel: made[need.channel] for need in estimators.sideslip.needs})
+    steered, straight = (
+        estimators.sideslip.estimate(car, log.replace(steer_rear=np.full(len(log), 0.4))) for car in (REAR, PLAIN)
+    )
+    np.testing.assert_allclose(steered.mean.slip_angle_rear, straight.mean.slip_angle_rear, atol=1e-12)
+
+
 def test_a_log_is_checked_against_such_a_car():
     made = method_logs.channels(rows=3000, rear=TURNED)
     names = ("v_x", "yaw_rate", "a_y", "a_x", "steer", "steer_rear")
@@ -335,6 +365,17 @@ def test_a_log_is_checked_against_such_a_car():
     spike = np.zeros(3000)
     spike[100] = 0.3
     assert ("steer_rear", "warning") not in judged(PLAIN, log.replace(steer_rear=spike))
+
+
+class Levered(vehicles.AbstractSteering):
+    inputs = ("lever",)
+    front_alone = True
+
+    def angles(self, car, u, v_x):
+        return u.lever, u.lever, 0.0, 0.0
+
+    def axle_gains(self, v_x):
+        return 1.0, 0.0
 
 
 def test_the_baseline_drives_with_all_four_wheels():

@@ -49,7 +49,7 @@ def next_told(last: Told, t, values, late) -> Told:
     delayed = last.steer + (raw_steer - last.steer) * (1.0 - jnp.exp(-dt / late))
     steer = jnp.where(last.steer_age > LONGEST, raw_steer, delayed)
     moves = fresh & (v_x >= LOWEST)
-    at_least, rear = jnp.maximum(v_x, LOWEST), jnp.zeros_like(t) + rear_angle(values)
+    at_least, rear = jnp.maximum(v_x, LOWEST), rear_angle(values, jnp.zeros_like(t))
     return Told(t, at_least, steer, a_x, v_x, raw_steer, speed_age, steer_age, inertial_age, moves, rear)
 
 

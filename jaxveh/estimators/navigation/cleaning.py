@@ -64,7 +64,7 @@ class Cleaning(AbstractCleaning):
         start = {name: nothing + (GRAVITY if name == "a_z" else 0.0) for name in self.unit}
         spoken = jnp.where(jnp.isnan(values["yaw_rate"]), start["yaw_rate"], values["yaw_rate"])
         rough = no_roughness(values["a_y"])
-        rear = nothing + rear_angle(values)
+        rear = rear_angle(values, nothing)
         memory = Felt(t, start, t - 2.0 * LONGEST_SILENCE, spoken, rough, empty_window(t), rear)
         return self._with_row(memory, t, values)
 
@@ -101,7 +101,7 @@ class Cleaning(AbstractCleaning):
 
     def _rear_steer(self, last: Any, values, dt: Any) -> Any:
         """The angle of the rear wheels (rad) at the time of the axle's balance."""
-        now = jnp.zeros_like(dt) + rear_angle(values)
+        now = rear_angle(values, jnp.zeros_like(dt))
         if self.parts.axle == "none":
             return now
         return last + dt / (0.5 * self.system.axle_time + dt) * (now - last)

@@ -138,7 +138,7 @@ class SlipAware(AbstractMethod):
 
     def _hear(self, memory: Memory, t, values):
         now = dict(values) | {"steer": steer_heard(values, self.car.steering_ratio, self.car.steer_offset)}
-        now["steer_rear"] = jnp.zeros_like(t) + rear_angle(values)
+        now["steer_rear"] = rear_angle(values, jnp.zeros_like(t))
         torques = [values[f"torque_{place}"] for place in vehicles.CORNERS]
         now["drive_torque"] = jnp.where(jnp.isnan(now["drive_torque"]), sum(torques), now["drive_torque"])
         heard = {n: jnp.where(jnp.isnan(now[n]), memory.heard[n], now[n]) for n in HELD}

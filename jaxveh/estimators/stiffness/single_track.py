@@ -70,7 +70,7 @@ class Followed(eqx.Module):
         old = jnp.where(jnp.stack([jnp.isnan(values[need.channel]) for need in LATERAL]), 1e3, 0.0).astype(t.dtype)
         v_x = known("v_x")
         moves = (old.max() <= LONGEST) & (v_x >= LOWEST)
-        rear = jnp.zeros_like(t) + rear_angle(values)
+        rear = rear_angle(values, jnp.zeros_like(t))
         return Signals(t, v_x, steer, steer, yaw_rate, a_y, steer, yaw_rate, a_y, old, moves, rear)
 
     def next(self, last: Signals, t, values) -> Signals:
@@ -93,7 +93,7 @@ class Followed(eqx.Module):
         return Signals(
             t, v_x, raw, steer, yaw_rate, a_y, follow(last.slow_steer, last.steer, steer), follow(last.slow_yaw_rate,
             last.yaw_rate, yaw_rate),
-            follow(last.slow_a_y, last.a_y, a_y), ages, moves, jnp.zeros_like(t) + rear_angle(values),
+            follow(last.slow_a_y, last.a_y, a_y), ages, moves, rear_angle(values, jnp.zeros_like(t)),
         )  # fmt: skip
 
 
