@@ -1,6 +1,7 @@
 """Cars with steered rear wheels: the recommended method of every quantity includes their angle, the others refuse such a car."""
 
 import dataclasses
+from typing import ClassVar
 
 import banked_drives
 import equinox as eqx
@@ -276,6 +277,7 @@ def test_it_is_held_in_gaps_and_after_long_ones_no_turn_is_heard():
     assert not silent[made["time"] > 4.05].any()
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("car", [REAR, STEERED["independent"], LAW])
 def test_slopes_batches_and_float32_with_gaps(car):
     made = method_logs.channels(rows=60, rear=TURNED)
@@ -368,8 +370,8 @@ def test_a_log_is_checked_against_such_a_car():
 
 
 class Levered(vehicles.AbstractSteering):
-    inputs = ("lever",)
-    front_alone = True
+    inputs: ClassVar[tuple] = ("lever",)
+    front_alone: ClassVar[bool] = True
 
     def angles(self, car, u, v_x):
         return u.lever, u.lever, 0.0, 0.0
@@ -391,6 +393,18 @@ def test_the_baseline_drives_with_all_four_wheels():
             np.testing.assert_allclose(values, by_ratio[name], rtol=1e-9, atol=1e-12)
     straight = of(vehicles.FrontSteering())["yaw_rate"]
     np.testing.assert_allclose(by_ratio["yaw_rate"][20:], 0.75 * straight[20:], atol=0.05 * np.abs(straight).max())
+    # In the steady turn of a constant steer, rear wheels that turn by a quarter of it take a quarter of the yaw rate.
+    held = log.replace(steer=np.full(100, 0.02))
+    turns = lambda steering: open_loop(dataclasses.replace(car, steering=steering), held)["yaw_rate"][-1]
+    ratio = turns(vehicles.FourWheelSteering(0.25)) / turns(vehicles.FrontSteering())
+    np.testing.assert_allclose(ratio, 0.75, rtol=1e-3)
+    # A car inside another is driven by its own steering; one that is steered by something else is refused.
+    inside = vehicles.Travelling(dataclasses.replace(car, steering=vehicles.RearSteering()))
+    np.testing.assert_allclose(open_loop(inside, log)["yaw_rate"], by_ratio["yaw_rate"], rtol=1e-9, atol=1e-12)
+    with pytest.raises(
+        InputError, match=r"open_loop: car.steering = Levered: needs lever; must be a steering whose inputs"
+    ):
+        open_loop(dataclasses.replace(car, steering=Levered()), log)
     with pytest.raises(
         InputError, match=r"open_loop_of: car.steering = RearSteering: needs steer_rear \(rad\) as well"
     ):
