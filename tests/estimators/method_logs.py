@@ -89,7 +89,8 @@ def channels(speed=15.0, seed=0, rows=ROWS, rear=0.0):
     front = CAR.mass * CAR.rear_axle_to_cg / 2.7 * flat
     noise = lambda values, std: values + std * rng.normal(size=rows)
     return {
-        **one, "time": t, "roll": roll, "pitch": -one["grade"], "yaw": yaw, "sideslip": np.arctan2(v_y, np.abs(v_x)),
+        **one, "motion_yaw_rate": one["yaw_rate"], "time": t,
+        "roll": roll, "pitch": -one["grade"], "yaw": yaw, "sideslip": np.arctan2(v_y, np.abs(v_x)),
         "yaw_rate": noise(yaw_rate, 0.002), "a_x": noise(a_x, 0.05), "a_y": noise(flat + G * np.sin(roll), 0.05),
         "a_z": noise(G * np.cos(roll), 0.05), "roll_rate": noise(rate(roll), 0.002),
         "pitch_rate": noise(-rate(one["grade"]), 0.002),

@@ -14,6 +14,7 @@ from test_every_method import QUANTITIES, every_quantity
 
 from jaxveh import InputError, Recording, diagnostics, estimators, io, vehicles
 from jaxveh.estimators import kit
+from jaxveh.estimators.friction.motion import start_told
 from jaxveh.estimators.linear_baseline import open_loop, open_loop_of
 from jaxveh.estimators.method_of_car import TURNING, method_of
 from jaxveh.estimators.rear_steer import rear_steer_of, with_rear_angle
@@ -100,9 +101,29 @@ def test_it_is_as_right_as_for_a_car_with_straight_rear_wheels(quantity, name, k
     last = slice(1000, None)
     for field in {*module.SHOWN, *({"v_y"} & {*said.mean._fields})} & {*TRUTHS}:
         off = lambda said, made, field=field: np.sqrt(np.mean(np.square((said[field] - truth_of(field, made))[last])))
-        assert off(said, made) <= max(TRUTHS[field], 1.5 * off(plain, straight)), field
+        assert off(said, made) <= max(TRUTHS[field], 1.3 * off(plain, straight)), field
         known = lambda said, field=field: np.mean(np.asarray(getattr(said.known, field))[last])
         assert known(said) >= known(plain) - 0.2, field
+
+
+def test_the_axles_of_stiffness_and_friction_carry_what_the_drive_feels():
+    """At the true motion, since on so short a drive neither quantity is known."""
+    made = method_logs.channels(rear=TURNED)
+    walking = QUANTITIES["stiffness"].METHODS["walking"].make(REAR).inner
+    bank = QUANTITIES["friction"].METHODS["bank"].make(REAR).inner.inner
+    flat = np.gradient(made["v_y"], made["time"]) + made["v_x"] * made["motion_yaw_rate"]
+    t, felt = jnp.asarray(0.0), {"walking": [], "bank": []}
+    rows = range(20, 300, 20)
+    for k in rows:
+        row = {name: jnp.asarray(made[name][k]) for name in ("v_x", "steer", "steer_rear", "a_y", "a_x", "yaw_rate")}
+        v_y, yaw_rate = made["v_y"][k], made["motion_yaw_rate"][k]
+        x = jnp.zeros(11).at[:2].set(jnp.stack([v_y, yaw_rate])).at[10].set(1.0)
+        felt["walking"].append(float(walking._forces(x, walking.followed.start(t, row))[2]))
+        told = start_told(t, row, bank.car.late)._replace(a_x=jnp.asarray(0.0))
+        forces = bank._forces(jnp.zeros(8).at[:2].set(jnp.stack([v_y, yaw_rate])), 3.0, told)
+        felt["bank"].append(float(sum(forces)) / PLAIN.mass)
+    for name, values in felt.items():
+        np.testing.assert_allclose(values, flat[list(rows)], atol=0.15, err_msg=name)
 
 
 @pytest.mark.thorough
