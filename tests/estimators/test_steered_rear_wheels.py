@@ -101,7 +101,7 @@ def test_it_is_as_right_as_for_a_car_with_straight_rear_wheels(quantity, name, k
     last = slice(1000, None)
     for field in {*module.SHOWN, *({"v_y"} & {*said.mean._fields})} & {*TRUTHS}:
         off = lambda said, made, field=field: np.sqrt(np.mean(np.square((said[field] - truth_of(field, made))[last])))
-        assert off(said, made) <= max(TRUTHS[field], 1.3 * off(plain, straight)), field
+        assert off(said, made) <= max(TRUTHS[field], 1.45 * off(plain, straight)), field
         known = lambda said, field=field: np.mean(np.asarray(getattr(said.known, field))[last])
         assert known(said) >= known(plain) - 0.2, field
 
