@@ -114,7 +114,7 @@ class RearAxle(AbstractTwoAxles):
     ellipse: jax.Array = positive("-", default=0.7)
     heading_offset: jax.Array = parameter("rad", scale=0.003, default=0.0)
     bank: jax.Array = parameter("rad", Interval(0.0, STEEPEST), default=0.02)
-    slip_error: jax.Array = positive("rad", default=0.006)
+    slip_error: jax.Array = positive("rad", default=0.004)
     force_noise: jax.Array = positive("s^0.5", default=0.01)
     slip_noise: jax.Array = positive("rad s^0.5", default=0.001)
     bank_time: jax.Array = positive("s", default=15.0)

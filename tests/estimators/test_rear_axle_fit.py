@@ -8,6 +8,7 @@ import test_rear_axle
 import test_sideslip
 
 from jaxveh import estimators
+from jaxveh._core.parameter import pick
 from jaxveh.estimators import rear_axle_fit
 
 SPREAD = np.array([0.3, 2.0, 0.05, 1.0, 1.0])
@@ -56,3 +57,17 @@ def test_a_log_that_contradicts_itself_has_wider_bands(monkeypatch):
     monkeypatch.setattr(rear_axle_fit, "disagreement", lambda *fits: 1.0)
     assert sound == share_of_prior(log)
     assert wide > 1.5 * share_of_prior(broken) and wide > 2 * sound
+
+
+def test_noises_of_rows_that_are_alike_are_larger_than_fitted_in_every_form_of_the_result(monkeypatch):
+    log = test_rear_axle.drive_of(test_sideslip.CAR).without("v_y")
+    larger = estimators.sideslip.calibrate(test_sideslip.CAR, log).fit
+    monkeypatch.setattr(rear_axle_fit, "ALIKE", {})
+    fitted = estimators.sideslip.calibrate(test_sideslip.CAR, log).fit
+    times = {"force_noise": 2.0, "slip_noise": 2.0}
+    for p, line, leaf in zip(larger.chosen, larger.unconstrained, pick(larger.model, larger.chosen), strict=True):
+        for one, other in ((larger.parameters, fitted.parameters), (larger.parameters_std, fitted.parameters_std)):
+            assert one[p.name] == pytest.approx(times.get(p.name, 1.0) * float(other[p.name]), rel=1e-12), p.name
+        assert leaf == larger.parameters[p.name]
+        assert p.domain.forward(line) == pytest.approx(float(leaf), rel=1e-12), p.name
+    np.testing.assert_array_equal(larger.covariance, fitted.covariance)
