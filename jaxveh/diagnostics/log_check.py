@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from jaxveh._core.host import on_host
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh.diagnostics.log_delays import check_delays
 from jaxveh.diagnostics.log_findings import LogFinding, LogView
 from jaxveh.diagnostics.log_magnitudes import check_gravity, check_units
@@ -12,9 +12,11 @@ from jaxveh.diagnostics.log_plausibility import check_plausibility
 from jaxveh.diagnostics.log_rates import check_rates
 from jaxveh.diagnostics.log_samples import check_samples
 from jaxveh.diagnostics.log_sampling import check_sampling
-from jaxveh.diagnostics.log_signs import check_signs, check_wheel_speeds
+from jaxveh.diagnostics.log_signs import check_signs
 from jaxveh.diagnostics.log_steering import check_steering
+from jaxveh.diagnostics.log_wheels import check_wheel_speeds
 from jaxveh.io import CarSpecification, with_road_steer
+from jaxveh.io import kit as io
 
 CHECKS = (
     check_names,
@@ -41,14 +43,17 @@ def check_log(recording: Recording, *, car: CarSpecification | None = None) -> l
     from `steering_wheel` and the file's ratio.
 
     The checks are: names that only look like known ones; rates, jitter, gaps and missing samples; repeated, frozen and coarse
-    values and spikes; magnitudes; signs and units, from relations between channels and of angles with their rates; delays, by
-    cross-correlation; steering scale and offset; grip and the car's numbers.
+    values and spikes; magnitudes; signs and units, from relations between channels, of angles with their rates and of the wheels
+    with each other; delays, by cross-correlation; steering scale and offset; grip and the car's numbers.
     They run on the host in NumPy, and change nothing. Simulated truth (`true.` channels) is not checked.
 
     For a car whose rear wheels are steered, their angle `steer_rear` (rad) is part of the car's model (`io.with_road_steer`); if
     it is missing, that is an error, and nothing is compared with the car.
     """
-    recording = recording if car is None else with_road_steer(car, recording)
+    check_recording("check_log", recording)
+    if car is not None:
+        io.check_car_file("check_log", car)
+        recording = with_road_steer(car, recording)
     log = LogView.of(recording, car)
     unknown = [] if car is None or car.steers_front_alone or log.has("steer_rear") else [_no_rear_angle(car)]
     log = LogView.of(recording, None) if unknown else log

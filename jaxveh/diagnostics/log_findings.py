@@ -137,6 +137,12 @@ def _inside(size: int, edge: int) -> np.ndarray:
     return inside
 
 
+AGREE = 0.5
+"""Correlation above which two channels count as related."""
+
+SCALED = 0.8
+"""Correlation above which a slope other than 1 is attributed to a unit; below it a channel may be damaged or late."""
+
 SAME = 1.35
 """Ratio up to which two channels that must agree do: scales and offsets of sensors, and motions that a relation leaves out."""
 

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import LogFinding, LogView, fit, is_one
-from jaxveh.diagnostics.log_signs import AGREE, SCALED
+from jaxveh.diagnostics.log_findings import AGREE, SCALED, LogFinding, LogView, fit, is_one, shown_time
 
 RATES = {
     "yaw": "yaw_rate",
@@ -23,14 +22,58 @@ RATES = {
 OVER_GROUND = ("course", "heading")
 """Directions that are measured over ground: while the car moves."""
 
+TURNS = ("yaw", "heading", "course", "steering_wheel")
+"""Angles that may jump by whole turns."""
+
+FULL = (2.0 * np.pi, 360.0)
+"""A full turn in rad, and in degrees."""
+
+NO_TURN = 0.05
+"""Share of a turn by which a jump may differ from whole turns, beside the change of the rows around it."""
+
+_BESIDE = 5  # samples on either side of a jump
+
 _SMOOTH = 0.5  # s
 _CLOCKWISE = "Left is positive, a compass counts clockwise; set sign = -1 in the channel map."
 
 
 def check_rates(log: LogView) -> list[LogFinding]:
-    """Check whether angles and heights follow their rates in sign and scale, where they move."""
+    """Check whether angles and heights follow their rates in sign and scale, where they move, and jump by whole turns only."""
     pairs = [(name, rate) for name, rate in RATES.items() if log.has(name, rate)]
-    return [finding for name, rate in pairs for finding in _compare(log, name, rate)]
+    compared = [finding for name, rate in pairs for finding in _compare(log, name, rate)]
+    return compared + [finding for name in TURNS if log.has(name) for finding in _jumps(log, name)]
+
+
+def _jumps(log: LogView, name: str) -> list[LogFinding]:
+    """Report jumps by more than half a turn to another level that are no whole turns: a counter that overflows."""
+    known = np.isfinite(log.channels[name])
+    if name in OVER_GROUND:
+        # A car that stands has no direction over ground.
+        speed = next((log.channels[one] for one in ("v_x", "speed") if log.has(one)), np.zeros(log.time.shape))
+        with np.errstate(invalid="ignore"):
+            known &= np.interp(log.time, log.time[np.isfinite(speed)], speed[np.isfinite(speed)]) > log.least_speed
+    time, samples = log.time[known], log.channels[name][known]
+    if samples.size < 4 * _BESIDE:
+        return []
+    changes = np.diff(samples)
+    around = lambda values: np.median(np.lib.stride_tricks.sliding_window_view(values, _BESIDE), axis=-1)
+    # Each change but for the first and last few, beside the usual one there, and the change of the level.
+    rows = np.arange(_BESIDE - 1, changes.size - _BESIDE + 1)
+    usual = around(np.pad(changes, _BESIDE // 2, mode="edge"))[rows]
+    step, level = changes[rows] - usual, around(samples)[_BESIDE:] - around(samples)[:-_BESIDE]
+    off = [np.abs(step - turn * np.round(step / turn)) < NO_TURN * turn for turn in FULL]
+    whole = np.any([near & (np.abs(step) > 0.5 * turn) for near, turn in zip(off, FULL, strict=True)], axis=0)
+    soon = np.diff(time)[rows] < 2.5 * np.median(np.diff(time))
+    found = (np.abs(step) > 0.5 * FULL[0]) & (np.abs(level) > 0.5 * np.abs(step)) & ~whole & soon
+    if not found.any():
+        return []
+    first = int(np.argmax(found))
+    message = (
+        f"jumps {int(found.sum())} time(s) by what is no whole turn, first by {step[first]:.4g} rad at "
+        f"{shown_time(time[rows[first] + 1])} s: a counter that overflows? Add the jump to the rows after it."
+    )
+    values = {"count": float(found.sum()), "time": float(time[rows[first] + 1]), "jump": float(step[first])}
+    return [LogFinding("error", name, message, values)]
 
 
 def _compare(log: LogView, name: str, rate: str) -> list[LogFinding]:

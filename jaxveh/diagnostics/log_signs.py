@@ -4,15 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import GRAVITY, LogFinding, LogView, fit, is_one
+from jaxveh.diagnostics.log_findings import AGREE, GRAVITY, SCALED, LogFinding, LogView, fit, is_one
 from jaxveh.diagnostics.log_steering import GENTLE
+from jaxveh.diagnostics.log_wheels import SAME_SPEED, wheels_over_speed
 from jaxveh.io import CarSpecification
-
-AGREE = 0.5
-"""Correlation above which two channels count as related."""
-
-SCALED = 0.8
-"""Correlation above which a slope other than 1 is attributed to a unit; below it a channel may be damaged or late."""
 
 SHIFTED = 1.0
 """m/s^2: a unit scales a channel and does not shift it: with a larger intercept no slope is attributed to one."""
@@ -27,44 +22,15 @@ _LATERAL = {
 }
 _LONGITUDINAL = {1 / 3.6: ("v_x", "km/h"), 0.44704: ("v_x", "mph"), 1 / GRAVITY: ("a_x", "g")}
 
-_SAME = (0.8, 1.25)
-"""Ratios of the wheels' speed to v_x that count as 1."""
-
 _ARMS = ((1.35, 1.35), (2.5, 2.5))
 """Two distances of a car and of a truck in m: from the centre of gravity to the rear axle, and yaw inertia over m a."""
-
-
-def check_wheel_speeds(log: LogView) -> list[LogFinding]:
-    """Check whether v_x agrees with the wheel speeds."""
-    ratio = _wheels_over_speed(log)
-    if ratio is None:
-        return []
-    values, story = {"ratio": ratio}, f"the wheels' speeds are {ratio:.3g} times v_x"
-    if _SAME[0] < ratio < _SAME[1]:
-        return [LogFinding("ok", "v_x", f"{story}.", values)]
-    for factor, unit in ((1 / 3.6, "km/h"), (0.44704, "mph")):
-        if abs(np.log(ratio / factor)) < np.log(1.15):
-            return [LogFinding("error", "v_x", f"{story}: v_x looks like {unit}. Set it in the channel map.", values)]
-    return [LogFinding("warning", "v_x", f"{story}, which should be 1: the wheels in rad/s or km/h?", values)]
-
-
-def _wheels_over_speed(log: LogView) -> float | None:
-    """Return the median of all wheel speeds over v_x in moving rows; None if there are too few rows."""
-    wheels = [values for name, values in log.channels.items() if name.startswith("wheel_speed")]
-    if not wheels or not log.has("v_x"):
-        return None
-    speed = log.channels["v_x"]
-    with np.errstate(invalid="ignore"):
-        ratios = np.stack(wheels) / np.where(speed > log.least_speed, speed, np.nan)
-    known = ratios[np.isfinite(ratios)]
-    return float(np.median(known)) if known.size >= 100 else None
 
 
 def check_signs(log: LogView) -> list[LogFinding]:
     """Check whether the signs of steer, yaw rate and lateral acceleration agree, and the accelerations follow the speeds."""
     findings = []
-    wheels = _wheels_over_speed(log)
-    confirmed = wheels is not None and _SAME[0] < wheels < _SAME[1]
+    wheels = wheels_over_speed(log)
+    confirmed = wheels is not None and SAME_SPEED[0] < wheels < SAME_SPEED[1]
     steering = _correlation(log) if log.has("steer", "yaw_rate", "v_x") else None
     lateral = _lateral(log) if log.has("v_x", "yaw_rate", "a_y") else None
     if steering is not None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_flags, check_one_of, path_of
+from jaxveh._core.errors import InputError, check, check_flags, check_kind, check_one_of, path_of
 from jaxveh.io.car_table import CarTable
 from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text, write_toml
 
@@ -236,7 +236,18 @@ def write_car(car: CarSpecification, path: str | os.PathLike, *, note: str = "",
     The file is written completely or not at all. **Raises** `InputError` if it exists and `overwrite` is False.
     """
     check_flags(overwrite=overwrite)
+    check_car_file("write_car", car)
     write_toml(car_lines(car), path, overwrite, note)
+
+
+def check_car_file(who: str, car: Any) -> None:
+    """Raise `InputError` unless `car` is what a car's file says."""
+    check_kind(
+        f"{who}: car",
+        car,
+        CarSpecification,
+        "io.read_car reads one from a file; a vehicle cannot be turned back into one.",
+    )
 
 
 def car_lines(car: CarSpecification, table: str = "") -> list[str]:

@@ -1,6 +1,6 @@
 """Tools to read and write further kinds of files."""
 
-from jaxveh.io.car import CAR_SCHEMA, STEERINGS, car_lines, car_of_toml
+from jaxveh.io.car import CAR_SCHEMA, STEERINGS, car_lines, car_of_toml, check_car_file
 from jaxveh.io.channel_map import CHANNEL_MAP_SCHEMA
 from jaxveh.io.datasets import dataset_of, frame_of, of_dataset
 from jaxveh.io.likely_names import MOST_LIKELY, likely_names, likely_words
@@ -40,6 +40,7 @@ __all__ = [
     "Entry",
     "car_lines",
     "car_of_toml",
+    "check_car_file",
     "check_file",
     "check_front_steered",
     "check_keys",

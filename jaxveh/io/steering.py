@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh._core.recording import Recording
-from jaxveh.io.car import CarSpecification
+from jaxveh._core.recording import Recording, check_recording
+from jaxveh.io.car import CarSpecification, check_car_file
 
 USUAL_MIDDLE_SPEED = 20.0
 """m/s: the speed at which a ratio is halfway between the two of a car's file, if the file does not say."""
@@ -22,6 +22,8 @@ def with_road_steer(car: CarSpecification, recording: Recording) -> Recording:
     the file's ratio times `steer` less its offset. The recording is unchanged if nothing is to be added, or what is needed is
     missing.
     """
+    check_car_file("with_road_steer", car)
+    check_recording("with_road_steer", recording)
     made: dict[str, Any] = {}
     values = lambda name: np.asarray(recording[name])
     given = lambda *names: all(name in recording and np.isfinite(values(name)).any() for name in names)
@@ -55,6 +57,7 @@ def rear_ratio(slow: Any, fast: Any, middle_speed: Any, v_x: Any) -> Any:
 def check_front_steered(car: CarSpecification, who: str, advice: str = "") -> None:
     """Raise `InputError`, with more `advice`, if the rear wheels of `car` are steered, because the equations of `who` do not
     include that."""
+    check_car_file(who, car)
     if not car.steers_front_alone:
         raise InputError(
             f'{who}: the car\'s file has steering = "{car.steering}", but the equations used here hold only for a car with '
