@@ -215,7 +215,7 @@ def check_one_of(name: str, value, allowed) -> None:
     """Raise `InputError` unless `value` is one of `allowed`; the message suggests the most similar one."""
     if not is_concrete(value) or isinstance(value, jax.Array | np.ndarray) or value not in tuple(allowed):
         raise InputError(
-            f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}.{did_you_mean([value], allowed)}"
+            f"{name} = {word_for(value)}: must be one of {', '.join(map(repr, allowed))}.{did_you_mean([value], allowed)}"
         )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh._core.host import on_host
 from jaxveh.diagnostics.chi_squared import chi_squared_band, two_sided
-from jaxveh.diagnostics.innovations import by_runs_and_rows, checked_skip
+from jaxveh.diagnostics.innovations import by_runs_and_rows, check_filtered, checked_skip
 
 FEW_RUNS = 10
 """Least number of runs for which the scatter between runs is used."""
@@ -64,6 +64,7 @@ def nis(estimate: Any, confidence: float = 0.95, skip: int = 0) -> Consistency:
 
     **Raises** `InputError` for particle filters, which have no NIS (use `nis_by_channel`), or if there is no measurement.
     """
+    check_filtered("nis", estimate)
     values = by_runs_and_rows(estimate.info.nis, skip)
     counts = np.sum([np.isfinite(by_runs_and_rows(v, skip)) for v in estimate.info.innovation], axis=0)
     if counts.any() and not np.isfinite(values[counts > 0]).any():
@@ -81,6 +82,7 @@ def nis_by_channel(estimate: Any, confidence: float = 0.95, skip: int = 0) -> di
     **Raises** `InputError` if a predicted standard deviation is not finite (noise without a covariance), or there is no
     measurement.
     """
+    check_filtered("nis_by_channel", estimate)
     found = {}
     for name, innovation in estimate.info.innovation._asdict().items():
         scaled = by_runs_and_rows(innovation, skip) / by_runs_and_rows(

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
+from jaxveh._core.errors import check_numbers
 from jaxveh._core.host import on_host
 
 LONGEST = 2.0
@@ -29,6 +30,8 @@ def delay(time: np.ndarray, mean: np.ndarray, truth: np.ndarray, *, longest: flo
     are interpolated at even steps. The result is NaN if fewer than ten rows are finite, the truth is constant, or there is no
     minimum within shifts of up to `longest` (s).
     """
+    for name, one in (("time", time), ("mean", mean), ("truth", truth)):
+        check_numbers(f"delay: {name}", one)
     time, mean, truth = (np.asarray(one, float) for one in (time, mean, truth))
     there = np.isfinite(mean) & np.isfinite(truth)
     if there.sum() < FEWEST:

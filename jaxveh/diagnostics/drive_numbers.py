@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxveh._core.errors import check_kind
 from jaxveh._core.host import on_host
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.braking_test import braking_test
@@ -79,6 +80,8 @@ def drive_numbers(
 
     **Raises** `InputError` if the drive does not allow the numbers: it is too short, or a channel is missing.
     """
+    if manoeuvre is not None:
+        check_kind("drive_numbers: manoeuvre", manoeuvre, str, 'It is the manoeuvre\'s name: "step-steer".')
     return {"peaks": peaks(recording), **_NUMBERS.get(manoeuvre or "", _none)(recording, _Car(wheelbase, steer_at_03g))}
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_has
 
 
 def checked_skip(skip: int, rows: int) -> int:
@@ -14,6 +14,11 @@ def checked_skip(skip: int, rows: int) -> int:
     if not 0 <= skip < rows:
         raise InputError(f"skip = {skip}: must be from 0 to {rows - 1}, for {rows} rows.")
     return skip
+
+
+def check_filtered(who: str, estimate: Any) -> None:
+    """Raise `InputError` unless `estimate` is that of a filter: the answers of a method have no `info`."""
+    check_has(f"{who}: estimate", estimate, ("info",), "filters.run returns one, and filters.monte_carlo returns runs.")
 
 
 def by_runs_and_rows(values: Any, skip: int = 0) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 
 from jaxveh.diagnostics.log_findings import GRAVITY, LogFinding, LogView
 from jaxveh.io import CarSpecification
+from jaxveh.io import kit as io
 
 FRICTION = 1.3
 """Largest lateral acceleration over gravity of tyres without downforce, racing tyres included."""
@@ -25,6 +26,7 @@ def check_plausibility(log: LogView) -> list[LogFinding]:
 
 def check_car(car: CarSpecification) -> list[LogFinding]:
     """Check whether stiffnesses over axle loads and the inertia over mass a b are plausible for a car."""
+    io.check_car_file("check_car", car)
     findings = []
     for axle, stiffness, arm in (
         ("front", float(car.front_cornering_stiffness or 0), car.rear_axle_to_cg),

@@ -9,7 +9,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, check
 from jaxveh._core.host import on_host
 from jaxveh._core.result import Result
-from jaxveh.diagnostics.innovations import by_runs_and_rows
+from jaxveh.diagnostics.innovations import by_runs_and_rows, check_filtered
 
 
 class ParticleHealth(NamedTuple):
@@ -46,6 +46,7 @@ def particle_health(estimate: Any, threshold: float = 0.1, particles: int | None
 
     **Raises** `InputError` for other filters, which have no effective sample size.
     """
+    check_filtered("particle_health", estimate)
     check("threshold", threshold, lambda v: (v > 0) & (v <= 1), "above 0 and at most 1")
     if particles is None:
         weights = getattr(getattr(estimate, "belief", None), "weights", None)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_numbers
 from jaxveh._core.host import on_host
 
 NORMAL_HALF, NORMAL_95 = 0.6744897501960817, 1.959963984540054
@@ -44,6 +44,8 @@ def score_band(
 
     **Raises** `InputError` if no row is left.
     """
+    for name, one in (("reference", reference), ("mean", mean), *((("std", std),) if std is not None else ())):
+        check_numbers(f"score_band: {name}", one)
     known = np.isfinite(reference) if which is None else np.isfinite(reference) & which
     if not known.any():
         raise InputError(

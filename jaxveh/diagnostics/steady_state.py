@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import InputError, check_kind, check_positive
 from jaxveh._core.host import on_host
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.drive_channels import (
@@ -108,6 +108,7 @@ def understeer(turns: SteadyTurns, *, above: float = 0.2, linear: float = LINEAR
 
     **Raises** `InputError` if there is no wheelbase, or there are too few rows in the range.
     """
+    check_kind("understeer: turns", turns, SteadyTurns, "steady_turns finds them in a recording.")
     if turns.geometric_steer is None:
         raise InputError("understeer: the geometric steer is unknown; give `steady_turns` the car's wheelbase (m).")
     size = np.abs(turns.a_y)

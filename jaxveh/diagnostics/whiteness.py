@@ -10,7 +10,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, check, is_whole
 from jaxveh._core.host import on_host
 from jaxveh.diagnostics.chi_squared import chi_squared_tails
-from jaxveh.diagnostics.innovations import whitened_innovations
+from jaxveh.diagnostics.innovations import check_filtered, whitened_innovations
 
 
 class Whiteness(NamedTuple):
@@ -62,6 +62,7 @@ def whiteness(estimate: Any, lags: int = 20, confidence: float = 0.95, skip: int
 
     **Raises** `InputError` for lags out of range, or if the innovations cannot be normalised.
     """
+    check_filtered("whiteness", estimate)
     check("confidence", confidence, lambda p: (p > 0) & (p < 1), "above 0 and below 1")
     white, here = whitened_innovations(estimate.info, skip)
     runs, rows, _ = white.shape

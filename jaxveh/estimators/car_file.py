@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from jaxveh._core.errors import InputError
 from jaxveh.io import CarSpecification
+from jaxveh.io import kit as io
 from jaxveh.vehicles import GRAVITY
 
 USUAL_ROLL_GRADIENT = 0.006
@@ -15,6 +16,7 @@ USUAL_ROLL_GRADIENT = 0.006
 def keys_of(car: CarSpecification, who: str, keys: Mapping[str, str]) -> dict[str, float]:
     """The numbers of a car's file by key; `keys` maps them to units. **Raises** `InputError` naming those that are missing,
     with units."""
+    io.check_car_file(who, car)
     missing = [f"{key} ({unit})" for key, unit in keys.items() if getattr(car, key) is None]
     if missing:
         give = "it" if len(missing) == 1 else "them"

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -205,6 +205,13 @@ def model_of(who: str, source: Any, model: Callable[[Any], StateSpace]) -> State
     return source.model
 
 
+def several_of(recording: Recording | Iterable[Recording]) -> list[Recording]:
+    """One recording, or several, as a list; what is no recording stays in it for a check that knows its name."""
+    if isinstance(recording, Recording) or not isinstance(recording, Iterable):
+        return [recording]
+    return list(recording)
+
+
 def spans_of(
     who: str, recording: Recording | Sequence[Recording], shortest: float, what: str
 ) -> tuple[list[Recording], tuple[Span, ...]]:
@@ -212,7 +219,7 @@ def spans_of(
 
     **Raises** `InputError` if there is no recording, or one is shorter than `shortest` (s), too short to contain `what`.
     """
-    recordings = [recording] if isinstance(recording, Recording) else list(recording)
+    recordings = several_of(recording)
     if not recordings:
         raise InputError(f"{who}: no log to calibrate on: give a recording, or several of one car.")
     for one in recordings:

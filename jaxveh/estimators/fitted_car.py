@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from jaxveh._core.errors import warn
-from jaxveh._core.recording import Recording
-from jaxveh.estimators.contract import Calibration
+from jaxveh._core.errors import check_kind, warn
+from jaxveh._core.recording import Recording, check_recording
+from jaxveh.estimators.contract import Calibration, several_of
 from jaxveh.estimators.front_axle import front_axle
 from jaxveh.estimators.rear_axle import RearAxle
 from jaxveh.estimators.sideslip_score import is_measured
 from jaxveh.io import AxleTyre, CarSpecification, with_road_steer
+from jaxveh.io import kit as io
 from jaxveh.vehicles import GRAVITY
 
 CURVE = 1.35
@@ -28,6 +29,11 @@ def fitted_car(
     fitted gain of a_y (`roll_gradient_of`). **Warns** (`JaxvehWarning`) if they stay although a
     recording is given.
     """
+    io.check_car_file("fitted_car", car)
+    recordings = several_of(recording)
+    for one in recordings:
+        check_recording("fitted_car", one)
+    check_kind("fitted_car: source", source, Calibration, "estimators.sideslip.calibrate returns one.")
     fitted = source.model.system
     load = float(fitted.mass) * GRAVITY * float(fitted.front_axle_to_cg) / float(fitted.wheelbase)
     stiffness, grip = float(fitted.stiffness) * load, float(fitted.grip) * load
@@ -40,7 +46,6 @@ def fitted_car(
         rear_cornering_stiffness=stiffness,
         roll_gradient=roll_gradient_of(car, fitted),
     )
-    recordings = [recording] if isinstance(recording, Recording) else recording
     recordings = [with_road_steer(car, one) for one in recordings]
     steered = [one for one in recordings if is_measured(one, "steer") and is_measured(one, "a_y")]
     told, new = car.front, front_axle(source.model, steered) if steered else None

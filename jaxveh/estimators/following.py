@@ -12,7 +12,7 @@ import numpy as np
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_flags, is_concrete
 from jaxveh._core.lengths import common_length, lengthen, lengthen_time, shorten
-from jaxveh._core.recording import Recording, time_for
+from jaxveh._core.recording import Recording, check_recording, time_for
 from jaxveh.estimators.contract import check_needs
 from jaxveh.estimators.method import AbstractMethod, AbstractSmoothable, Answer, Answers, dtype_of
 from jaxveh.estimators.rear_steer import check_rear_angle
@@ -40,6 +40,7 @@ def follow(who: str, method: AbstractMethod, recording: Recording, *, smoothed: 
             f"{who}: smoothed: {type(method).__name__} looks back only. Leave smoothed out, or take the recommended "
             "method or another kit.AbstractSmoothable."
         )
+    check_recording(who, recording)
     check_rear_angle(who, method, recording)
     there = [need for need in method.needs if not need.optional or need.channel in recording]
     check_needs(who, tuple(need._replace(optional=False) for need in there), recording)

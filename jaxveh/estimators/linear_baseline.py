@@ -11,12 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, word_for
+from jaxveh._core.errors import InputError, check_kind, word_for
 from jaxveh._core.lengths import common_length, lengthen, lengthen_time
 from jaxveh._core.names import record
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh.estimators.contract import Need, check_needs
 from jaxveh.io import CarSpecification, with_road_steer
+from jaxveh.io import kit as io
 from jaxveh.statespace import Propagate, Row
 from jaxveh.tyres import AbstractDynamicTyre, Linear
 from jaxveh.vehicles import (
@@ -50,6 +51,7 @@ def open_loop(car: Any, recording: Recording) -> dict[str, np.ndarray]:
     `yaw_rate` (rad/s), `sideslip` (rad). **Raises** `InputError` for channels that are missing or have gaps, or for a car without
     axles or one that is steered by something else.
     """
+    check_kind("open_loop: car", car, AbstractVehicle, "A car's file is for estimators.open_loop_of_file.")
     asked = tuple(Need(name, "rad", throughout=True) for name in _steering_of(car).inputs)
     check_needs("open_loop", (*asked, SPEED), recording)
     angles = [recording[need.channel] for need in asked]
@@ -100,6 +102,8 @@ def _on_linear_tyres(car: Any) -> SingleTrack:
 def open_loop_of_file(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray] | None:
     """`open_loop` of a car's file, along a log that has the angles of its wheels or those from which they follow
     (`io.with_road_steer`); None if one of them, or `v_x`, has no value."""
+    io.check_car_file("open_loop_of_file", car)
+    check_recording("open_loop_of_file", recording)
     recording, vehicle = with_road_steer(car, recording), from_specification(car)
     if not car.steers_front_alone:
         vehicle = dataclasses.replace(vehicle, steering=RearSteering())
@@ -124,6 +128,7 @@ def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndar
 def open_loop_of(car: Any, time, steer, v_x, steer_rear=None) -> dict[str, jax.Array]:
     """The same as `open_loop` for (T,) arrays, which may be traced. `steer_rear` (rad): of a car whose rear axle has an angle of
     its own. **Raises** `InputError` if such a car is not given one."""
+    check_kind("open_loop_of: car", car, AbstractVehicle, "A car's file is for estimators.open_loop_of_file.")
     linear_car = _linear_car(car)
     inputs = {"steer": jnp.asarray(steer), "v_x": jnp.asarray(v_x)}
     if "steer_rear" in linear_car.steering.inputs:

@@ -19,7 +19,7 @@ from jaxveh.filters import AbstractFilter, Estimate, Unscented, run
 from jaxveh.fitting import prediction_error
 from jaxveh.io import CarSpecification
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.statespace import Continuous, Gaussian, Heun, Prior, Propagate, StateSpace, with_parameters
+from jaxveh.statespace import Continuous, Gaussian, Heun, Prior, Propagate, StateSpace, kit, with_parameters
 from jaxveh.vehicles import Longitudinal
 
 NAME = "mass_and_grade"
@@ -136,6 +136,7 @@ def _check_spreads(needed: Mapping[str, Any], optional: Mapping[str, Any]) -> No
 
 def chosen_parameters(model: Any):
     """The parameters and noise levels that a calibration fits: the air's drag, and all noise levels."""
+    kit.check_model("mass_and_grade: chosen_parameters", model)
     return (model.system.drag, *model.process_noise.law.std, *model.measurement_noise.std)
 
 

@@ -7,11 +7,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh.estimators.following import follow
 from jaxveh.estimators.method import Answers, LiveMethod
 from jaxveh.estimators.method_of_car import MethodOfCar, method_of
 from jaxveh.io import CarSpecification
+from jaxveh.io import kit as io
 
 
 class Estimate(Protocol):
@@ -84,11 +85,18 @@ def live_of(name: str, shown: Mapping[str, str], methods: Mapping[str, MethodOfC
     return live
 
 
+def check_drive(who: str, car: Any, recording: Any) -> None:
+    """Raise `InputError` unless these are a car's file and a recording."""
+    io.check_car_file(who, car)
+    check_recording(who, recording)
+
+
 def constant_of(name: str, values: Callable[[CarSpecification], Mapping[str, float | None]], text: str) -> DoNothing:
     """The function `do_nothing` of the module of a quantity: the same `values` of a car's file, by name, in every row; None is
     NaN. `text` says what they are."""
 
     def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
+        check_drive(f"{name}: do_nothing", car, recording)
         told = {field: np.nan if value is None else value for field, value in values(car).items()}
         return {field: np.full(len(recording), value) for field, value in told.items()}
 

@@ -6,13 +6,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError
-from jaxveh._core.recording import Recording
+from jaxveh._core.errors import InputError, check_has, check_kind
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh.diagnostics import Score, score_band
 from jaxveh.estimators.linear_baseline import open_loop_of_file
 from jaxveh.estimators.rear_axle import RearAxle
 from jaxveh.filters import Estimate, SmoothedEstimate
 from jaxveh.io import CarSpecification
+from jaxveh.io import kit as io
 
 TOGETHER = 0.1
 """Share of the rarer channel's rows; below it, two channels do not share a clock."""
@@ -25,6 +26,7 @@ def is_measured(recording: Recording, name: str) -> bool:
 
 def speak_apart(recording: Recording) -> bool:
     """Whether yaw rate and lateral acceleration are measured, but hardly ever in the same row: two clocks."""
+    check_recording("speak_apart", recording)
     if not (is_measured(recording, "yaw_rate") and is_measured(recording, "a_y")):
         return False
     there = [np.isfinite(np.asarray(recording[name])) for name in ("yaw_rate", "a_y")]
@@ -34,6 +36,8 @@ def speak_apart(recording: Recording) -> bool:
 def at_centre(car: CarSpecification | RearAxle, recording: Recording) -> Recording:
     """The recording with the `v_y` of a reference, m/s, moved to the centre of gravity from the position where the car's file
     says that it is measured (`reference_position`): less the distance of that position ahead times the yaw rate."""
+    check_kind("at_centre: car", car, CarSpecification | RearAxle, "io.read_car reads a car's file.")
+    check_recording("at_centre", recording)
     ahead = _reference_ahead(car)
     if not ahead:
         return recording
@@ -47,12 +51,14 @@ def _reference_ahead(car: CarSpecification | RearAxle) -> float:
 
 def reference_sideslip(recording: Recording) -> jax.Array:
     """atan2(v_y, v_x) of a recording that has v_y, rad, (T,)."""
+    check_recording("reference_sideslip", recording)
     return jnp.arctan2(recording["v_y"], recording["v_x"])
 
 
 def least_speed_of(car: CarSpecification) -> float:
     """Speed (m/s) below which sideslip is not scored by default: 3, and 0.5 for cars with a wheelbase of less than a metre.
     At lower speeds sideslip is the quotient of two small numbers."""
+    io.check_car_file("least_speed_of", car)
     return 3.0 if car.wheelbase >= 1.0 else 0.5
 
 
@@ -71,6 +77,9 @@ def score(
 
     **Raises** `InputError` if no row is left.
     """
+    io.check_car_file("score", car)
+    check_has("score: found", found, ("mean", "std"), "estimators.sideslip.estimate returns one.")
+    check_recording("score", recording)
     v_y, v_x = np.asarray(recording["v_y"]), np.asarray(recording["v_x"])
     floor = least_speed_of(car) if least_speed is None else least_speed
     ahead = _reference_ahead(car)

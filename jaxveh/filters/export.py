@@ -15,6 +15,7 @@ from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh.io import kit, making_folder
 from jaxveh.statespace import AbstractFilter, Row, StateSpace
+from jaxveh.statespace import kit as statespace
 
 NUMBERS = ("log_likelihood", "nis", "ess", "result")
 
@@ -35,6 +36,7 @@ def export_filter(folder: str | Path, filter: AbstractFilter, model: StateSpace,
 
     **Raises** `InputError` where the folder exists already or cannot be written, and as `filter.check`.
     """
+    statespace.check_told(filter, model)
     folder = Path(folder)
     if folder.exists():
         raise InputError(f"folder = {folder}: exists already; nothing is overwritten.")

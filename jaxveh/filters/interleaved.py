@@ -9,8 +9,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, word_for
-from jaxveh._core.recording import Recording
+from jaxveh._core.errors import InputError, check_kind, word_for
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh._core.result import first_failure
 from jaxveh.statespace import AbstractFilter, Row, StateSpace
 
@@ -73,6 +73,8 @@ def interleave(
     structure, shapes or dtypes in a row.
     """
     _check_turns(turns)
+    if not isinstance(recording, Row):
+        check_recording("interleave", recording)
     rows = {
         name: recording if isinstance(recording, Row) else turn.model.rows(recording) for name, turn in turns.items()
     }
@@ -119,6 +121,7 @@ def _with_system(turn: Turn, told: Any) -> StateSpace:
 
 
 def _check_turns(turns: Mapping[str, Turn]) -> None:
+    check_kind("interleave: turns", turns, Mapping, "Such as {'state': filters.Turn(...)}.")
     if not turns:
         raise InputError("interleave: turns is empty: must name at least one Turn.")
     for name, turn in turns.items():

@@ -8,7 +8,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_flags, word_for
+from jaxveh._core.errors import InputError, check_flags, check_has, word_for
 from jaxveh._core.names import as_mapping
 from jaxveh._core.recording import Recording, check_recording
 from jaxveh.io.canonical import canonical_unit
@@ -103,6 +103,12 @@ def write_frame(frame: Any, path: str | os.PathLike, *, overwrite: bool = False)
     and for a frame without `time` or with columns that are not numbers.
     """
     check_flags(overwrite=overwrite)
+    check_has(
+        "write_frame: frame",
+        frame,
+        ("columns", "attrs"),
+        "io.to_frame makes a frame; a Recording is for write_recording.",
+    )
     if "time" not in frame.columns:
         raise InputError(f"write_frame: no column `time`; there are: {', '.join(map(str, frame.columns))}.")
     columns = {str(name): numeric(frame[name].to_numpy(), f"write_frame: column {name!r}") for name in frame.columns}

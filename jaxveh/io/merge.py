@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.names import check_names
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh.io.log import Column
 
 
@@ -39,6 +39,7 @@ def resample(recording: Recording, raster: str, method: str = "linear", max_gap:
     **Raises** `InputError` for an unknown channel or method, or if `raster` has no sample.
     """
     check_one_of("method", method, ("linear", "hold"))
+    check_recording("resample", recording)
     check_names("resample: raster", [raster], recording.names)
     rows = np.isfinite(np.asarray(recording[raster]))
     if not rows.any():

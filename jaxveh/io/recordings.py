@@ -210,6 +210,7 @@ def write_recording(recording: Recording, path: str | os.PathLike, *, overwrite:
 
 def with_units_in_names(recording: Recording) -> Recording:
     """Return a copy whose channels are named `name [unit]`, for CSV files for other programs; reading removes the units."""
+    check_recording("with_units_in_names", recording)
     units = {name: recording.unit(name) for name in recording.names}
     names = {name: f"{name} [{unit}]" if is_unit(unit) else name for name, unit in units.items()}
     channels = {names[name]: values for name, values in recording.channels.items()}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_flags, check_one_of, path_of
+from jaxveh._core.errors import InputError, check, check_flags, check_kind, check_one_of, path_of
 from jaxveh.io.toml import check_file, check_keys, read_toml, toml_number, toml_string, toml_text, write_toml
 
 ROAD_SCHEMA = """\
@@ -99,6 +99,7 @@ def write_road(road: RoadSpecification, path: str | os.PathLike, *, note: str = 
     The file is written completely or not at all. **Raises** `InputError` if it exists and `overwrite` is False.
     """
     check_flags(overwrite=overwrite)
+    check_kind("write_road: road", road, RoadSpecification, "io.read_road reads one from a file.")
     lines = []
     for entry in fields(road):
         value = getattr(road, entry.name)

@@ -6,9 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import check_positive
+from jaxveh._core.errors import check_kind, check_positive
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import drive_channels
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import AbstractVehicle
 
 TYPICAL = {"front": 1.2, "rear": 1.5, "track": 1.55}
 """Positions of the axles and track of an ordinary passenger car, m, for recordings without a car."""
@@ -61,6 +63,8 @@ def footprint(recording: Recording, car: Any, wheelbase: float | None, track: fl
     """Return the footprint of a `car` (inside any wrapper) or, without one, of a wheelbase and a track (m)."""
     while hasattr(car, "vehicle"):
         car = car.vehicle
+    if car is not None:
+        check_kind("car", car, AbstractVehicle | CarSpecification, "vehicles.passenger_car() is one.")
     for name, value in (("wheelbase", wheelbase), ("track", track)):
         if value is not None:
             check_positive(name, value, "m")
@@ -71,7 +75,7 @@ def footprint(recording: Recording, car: Any, wheelbase: float | None, track: fl
     if wheelbase is not None:
         front, rear = (wheelbase * part / (front + rear) for part in (front, rear))
     tracks = [
-        float(getattr(car, f"track_{axle}", TYPICAL["track"])) if track is None else float(track)
+        float(getattr(car, f"track_{axle}", None) or TYPICAL["track"]) if track is None else float(track)
         for axle in ("front", "rear")
     ]
     return Footprint(

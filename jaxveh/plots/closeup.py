@@ -9,8 +9,8 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.names import as_mapping, as_names, check_names
-from jaxveh._core.recording import Recording
-from jaxveh.plots.estimates import BAND, bands, check_estimate
+from jaxveh._core.recording import Recording, check_recording
+from jaxveh.plots.estimates import BAND, bands, check_estimate, check_truth
 from jaxveh.plots.quantities import quantity
 from jaxveh.plots.style import COLOURS, CYCLE, label_above, legend, new_figure, style
 
@@ -42,6 +42,8 @@ def closeup(
     **Returns** the figure. **Raises** `InputError` for unknown names, rows that do not agree, or if there is no finite value.
     """
     check_estimate("plots.closeup", estimate, "mean", "std")
+    check_recording("plots.closeup", recording)
+    check_truth("plots.closeup", truth)
     mean = as_mapping(estimate.mean, "mean")
     check_names("plots.closeup", [quantity_name], mean)
     shown_channels = [name for name in CHANNELS if name in recording] if channels is None else list(as_names(channels))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_flags, check_positive, word_for
+from jaxveh._core.errors import InputError, check_flags, check_kind, check_positive, word_for
 from jaxveh._core.names import as_mapping, as_names, check_names
 from jaxveh._core.recording import Recording
 from jaxveh.plots.quantities import quantity
@@ -50,6 +50,12 @@ def check_estimate(who: str, estimate: Any, *fields: str) -> None:
         )
 
 
+def check_truth(who: str, truth: Any) -> None:
+    """Raise `InputError` unless it is a recording or a mapping, or None."""
+    if truth is not None:
+        check_kind(f"{who}: truth", truth, Recording | Mapping, "Such as {'sideslip': values}.")
+
+
 def estimate(
     estimates: Any,
     truth: Recording | Mapping[str, Any] | None = None,
@@ -83,6 +89,7 @@ def estimate(
     known = as_mapping(first.mean, "mean")
     names = list(known if quantities is None else as_names(quantities))
     check_names("plots.estimate", names, known)
+    check_truth("plots.estimate", truth)
     if errors and truth is None:
         raise InputError("plots.estimate: errors need a truth; give `truth=`, or leave `errors` out.")
     check_positive("seconds", seconds, "s")

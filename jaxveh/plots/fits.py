@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_kind
 from jaxveh._core.names import check_names
 from jaxveh.plots.estimates import BAND
 from jaxveh.plots.style import COLOURS, CYCLE, new_figure, style
@@ -27,6 +27,9 @@ def fit(fit: Any, truth: Mapping[str, Any] | None = None, *, figure: Any = None)
     **Returns** the figure. **Raises** `InputError` for arrays, more than 40 parameters, or a truth without one of them.
     """
     value = getattr(fit, "parameters", fit) if not isinstance(fit, Mapping) else fit
+    check_kind("plots.fit: fit", value, Mapping, "A fit, or the Parameters of one.")
+    if truth is not None:
+        check_kind("plots.fit: truth", truth, Mapping, "Such as {'front.B': 10.0}.")
     std = {} if value is fit else fit.parameters_std
     names = list(value)
     if not names or len(names) > MOST or any(np.ndim(value[name]) for name in names):

@@ -8,7 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_flags, check_one_of
+from jaxveh._core.errors import InputError, check_flags, check_kind, check_one_of
 from jaxveh.plots.style import COLOURS, colour, legend, new_figure, style
 from jaxveh.plots.tyres import check_tyre
 from jaxveh.tyres import Contact
@@ -35,6 +35,8 @@ def force_curves(
     **Returns** the figure. **Raises** `InputError` if an axle's slips are missing.
     """
     check_flags(errors=errors)
+    check_kind("plots.force_curves: cars", cars, Mapping, "Such as {'truth': car}.")
+    check_kind("plots.force_curves: slips", slips, Mapping, "Such as {'front': slips, 'rear': slips}.")
     for axle in vehicles.AXLES:
         check_one_of("axle", axle, tuple(slips))
     for label, car in cars.items():

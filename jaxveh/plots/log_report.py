@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_kind
 from jaxveh._core.recording import Recording
 from jaxveh.plots import report_page as html
 from jaxveh.plots.innovations import InnovationPoints
@@ -48,7 +48,8 @@ def log_report(logs: Sequence[ReportedLog], *, title: str = "Sideslip", tables: 
 
     if not logs:
         raise InputError("plots.log_report: no log to report on; give at least one.")
-    for log in logs:
+    for log in logs if isinstance(logs, list | tuple) and not hasattr(logs, "_fields") else [logs]:
+        check_kind("plots.log_report: logs", log, ReportedLog, "Give a list of them.")
         rows = len(log.estimate.time)
         if rows != len(log.recording):
             raise InputError(

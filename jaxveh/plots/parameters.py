@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import InputError, check_kind, check_positive
 from jaxveh._core.names import check_names
 from jaxveh.plots.estimates import BAND
 from jaxveh.plots.style import COLOURS, colour, legend, new_figure, style
@@ -29,6 +29,8 @@ def parameters(
 
     **Returns** the figure. **Raises** `InputError` for names that do not agree.
     """
+    for what, given in (("truth", truth), ("mean", mean), ("std", std), ("scale", scale)):
+        check_kind(f"plots.parameters: {what}", given, Mapping, "From names to numbers.")
     names = tuple(truth)
     truths, scales = _numbers("truth", truth, names), _numbers("scale", scale, names)
     check_positive("scale", scales)

@@ -9,8 +9,9 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from jaxveh._core.errors import check_has
 from jaxveh._core.parameter import put
-from jaxveh._core.recording import Recording
+from jaxveh._core.recording import Recording, check_recording
 from jaxveh.estimators import Calibration, RearAxle, sideslip
 from jaxveh.estimators import kit as estimators
 from jaxveh.plots.style import COLOURS, CYCLE, legend, new_figure, style
@@ -84,6 +85,11 @@ def rear_axle_points(source: Any, estimate: Any, recording: Recording, *, least_
     **Arguments**: `source`: a `Calibration` of sideslip, its model, or a car whose values are used. `estimate`: its estimate for
     the `recording` (T rows each). Rows slower than `least_speed` (m/s) are left out.
     """
+    needed = ("slip_angle_rear", "F_yr")
+    advice = "estimators.sideslip.estimate without a method returns such an estimate."
+    check_has("plots.rear_axle: estimate", estimate, ("mean",), advice)
+    check_has("plots.rear_axle: estimate.mean", estimate.mean, needed, advice)
+    check_recording("plots.rear_axle", recording)
     system = estimators.model_of(sideslip.NAME, source, sideslip.model).system
     a_x = np.nan_to_num(np.asarray(recording["a_x"])) if "a_x" in recording else np.zeros(len(recording))
     u = SimpleNamespace(a_x=jnp.asarray(a_x), v_x=jnp.asarray(recording["v_x"]))

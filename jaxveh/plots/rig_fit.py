@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import check_one_of
+from jaxveh._core.errors import check_kind, check_one_of
 from jaxveh._core.names import as_names
 from jaxveh.fitting import RigFit, kit
 from jaxveh.io import RigTable
@@ -61,6 +61,8 @@ def rig_fit(fit: RigFit, rig: RigTable, channels: Sequence[str] | None = None, *
 
     **Raises** `InputError` for a channel that was not fitted.
     """
+    check_kind("plots.rig_fit: fit", fit, RigFit, "fitting.fit_rig returns one.")
+    check_kind("plots.rig_fit: rig", rig, RigTable, "io.read_rig_table reads one.")
     chosen = tuple(fit.rmse) if channels is None else as_names(channels)
     for name in chosen:
         check_one_of("channels", name, tuple(fit.rmse))

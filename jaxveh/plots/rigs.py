@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from jaxveh._core.errors import check_kind
 from jaxveh._core.names import as_names, check_names
 from jaxveh.io import RigTable, kit
 from jaxveh.plots.rig_fit import COLOUR_MAP, DOTS, QUANTITIES, SLIPS, slip_of
@@ -20,6 +21,7 @@ def rig(rig: RigTable, channels: Sequence[str] | None = None, *, figure: Any = N
 
     **Raises** `InputError` for a channel that was not measured.
     """
+    check_kind("plots.rig: rig", rig, RigTable, "io.read_rig_table reads one.")
     there = [name for name in kit.RIG_CHANNELS if getattr(rig, name) is not None]
     names = there if channels is None else list(as_names(channels))
     check_names("plots.rig", names, there)

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_positive
+from jaxveh._core.errors import InputError, check, check_kind, check_positive
 from jaxveh._core.result import Result, code
 from jaxveh._core.traced import trace_once
 from jaxveh.simulation.driven import Driven, dtype_of
@@ -103,6 +103,7 @@ def solve(
 
     **Raises** `InputError` for instants that coincide in the car's dtype.
     """
+    check_kind("solve: driven", driven, Driven, "simulation.driven_car returns one.")
     dtype = dtype_of(driven.car.vehicle)
     _check_distinct("rows", grid.rows, dtype)
     _check_distinct("steps", grid.steps, dtype)

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 
+from jaxveh._core.errors import check_kind
 from jaxveh.sensors import Instrumented
 from jaxveh.simulation.driven import Driven, DrivenState, dtype_of
 from jaxveh.statespace import Heun, RolledRK4, StabilisedRK4
@@ -75,6 +76,7 @@ def fastest_pole(driven: Driven, t: Any, x: Any) -> jax.Array:
 
     The sensors' low-pass does not act on the car, so its poles are taken separately.
     """
+    check_kind("fastest_pole: driven", driven, Driven, "simulation.driven_car returns one.")
     bare = Driven(Instrumented(driven.car.vehicle), driven.driver)
     flat, shaped = ravel_pytree(DrivenState(driven.car.split(x.car)[0], x.driver))
     found = spectral_radius(differences(lambda y: ravel_pytree(bare.derivatives(t, shaped(y)))[0], flat))

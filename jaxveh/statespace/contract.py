@@ -17,7 +17,7 @@ from jaxveh._core.parameter import check_parameters
 from jaxveh.numerics import apart
 from jaxveh.statespace.belief import AbstractBelief, Info
 from jaxveh.statespace.measurements import likelihood_result
-from jaxveh.statespace.model import Row, StateSpace
+from jaxveh.statespace.model import Row, StateSpace, check_model
 from jaxveh.statespace.told_rows import check_belief, check_has_count, check_rows
 
 KEPT = "kept for the backward pass"
@@ -254,14 +254,6 @@ def check_told(filter: Any, model: Any) -> None:
     ):
         if not isinstance(value, kind):
             raise InputError(f"{name} = {word_for(value)}: must be {example}. The order is filter, model, recording.")
-
-
-def check_model(who: str, model: Any) -> None:
-    """Raise `InputError` unless it is a `StateSpace`."""
-    if not isinstance(model, StateSpace):
-        raise InputError(
-            f"{who}: model = {word_for(model)}: must be a StateSpace, as returned by estimators.state_space."
-        )
 
 
 def layers(filter: Any) -> tuple[Any, ...]:

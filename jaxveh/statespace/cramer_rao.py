@@ -14,7 +14,7 @@ from jaxveh._core.parameter import strong
 from jaxveh._core.recording import Recording
 from jaxveh.statespace.draw import draw_rows, propagate, schedule_rows
 from jaxveh.statespace.location import location_covariance
-from jaxveh.statespace.model import StateSpace
+from jaxveh.statespace.model import StateSpace, check_model
 
 
 class PosteriorBound(NamedTuple):
@@ -56,6 +56,7 @@ def posterior_cramer_rao(model: StateSpace, schedule: Recording, key, runs: int 
     """
     check_whole("runs", runs)
     check_key("posterior_cramer_rao", key)
+    check_model("posterior_cramer_rao", model)
     model = strong(model)
     rows = schedule_rows(model, schedule)
     noisy = () if model.process_noise is None else model.process_noise.law.names

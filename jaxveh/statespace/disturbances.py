@@ -12,7 +12,7 @@ from jaxveh._core.errors import InputError, check_positive, check_single
 from jaxveh._core.names import check_names, record_type
 from jaxveh.statespace.dependent_noise import around
 from jaxveh.statespace.independent import combine
-from jaxveh.statespace.model import Prior, StateSpace
+from jaxveh.statespace.model import Prior, StateSpace, check_model
 from jaxveh.statespace.noise import Gaussian
 from jaxveh.statespace.process import Continuous, join
 
@@ -101,6 +101,7 @@ def with_disturbances(
 
     **Raises** `InputError` for names that are no states or channels, and standard deviations that are not positive.
     """
+    check_model("with_disturbances", model)
     walk, felt = dict(walk or {}), dict(felt or {})
     if not prior:
         raise InputError("with_disturbances: prior is empty; name at least one state that is pushed.")

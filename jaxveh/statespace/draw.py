@@ -12,9 +12,9 @@ import numpy as np
 from jaxveh._core.errors import check_key
 from jaxveh._core.names import record
 from jaxveh._core.parameter import strong
-from jaxveh._core.recording import TRUTH, Recording
+from jaxveh._core.recording import TRUTH, Recording, check_recording
 from jaxveh.statespace.dependent_noise import StateDependent
-from jaxveh.statespace.model import Row, StateSpace
+from jaxveh.statespace.model import Row, StateSpace, check_model
 
 
 class Drawn(NamedTuple):
@@ -35,6 +35,7 @@ def draw(model: StateSpace, schedule: Recording, key) -> Drawn:
     Angles are drawn unwrapped. **Raises** `InputError` for a schedule without the model's inputs.
     """
     check_key("draw", key)
+    check_model("draw", model)
     model = strong(model)
     states, rows = _drawn(model, schedule_rows(model, schedule), key)
     shown = _report(model, rows, states)
@@ -47,6 +48,8 @@ def draw(model: StateSpace, schedule: Recording, key) -> Drawn:
 
 def schedule_rows(model: StateSpace, schedule: Recording) -> Row:
     """The rows of a schedule, (T,) leaves: measured channels that it does not have count as present in every row."""
+    check_model("schedule_rows", model)
+    check_recording("schedule", schedule)
     lacking = [name for name in model.channels if name not in schedule]
     return model.rows(schedule.replace(**{name: np.zeros(len(schedule)) for name in lacking}))
 

@@ -12,7 +12,7 @@ from jaxveh.statespace.capabilities import (
     who_lacks,
 )
 from jaxveh.statespace.common_length import of_common_length
-from jaxveh.statespace.contract import KEPT, check_model, check_told, innermost, key_for, layers
+from jaxveh.statespace.contract import KEPT, check_told, innermost, key_for, layers
 from jaxveh.statespace.dependent_noise import check_fixed
 from jaxveh.statespace.disturbances import DISTURBANCE_PREFIX
 from jaxveh.statespace.draw import draw_rows, schedule_rows
@@ -32,6 +32,7 @@ from jaxveh.statespace.driver import (
 from jaxveh.statespace.given_rows import scalar_row
 from jaxveh.statespace.independent import whiten
 from jaxveh.statespace.measurements import by_channel, input_result, likelihood_result, presence, result_of_parts
+from jaxveh.statespace.model import check_model
 from jaxveh.statespace.noise import LOG_2PI
 from jaxveh.statespace.solvers import EXPLICIT, in_both_modes
 

@@ -280,3 +280,11 @@ def cast(tree, dtype):
     """
     to = lambda leaf: leaf.astype(dtype) if isinstance(leaf, jax.Array) and eqx.is_inexact_array(leaf) else leaf
     return jax.tree.map(to, tree)
+
+
+def check_model(who: str, model: Any) -> None:
+    """Raise `InputError` unless it is a `StateSpace`."""
+    if not isinstance(model, StateSpace):
+        raise InputError(
+            f"{who}: model = {word_for(model)}: must be a StateSpace, as returned by estimators.state_space."
+        )

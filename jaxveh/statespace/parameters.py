@@ -15,7 +15,7 @@ from jaxveh._core.parameter import Parameter, Where, check_shares, pick, prior_s
 from jaxveh._core.parameters import Parameters
 from jaxveh.statespace.dependent_noise import around
 from jaxveh.statespace.independent import Independent
-from jaxveh.statespace.model import Prior, StateSpace
+from jaxveh.statespace.model import Prior, StateSpace, check_model
 from jaxveh.statespace.noise import Gaussian
 from jaxveh.statespace.process import Continuous, join
 
@@ -113,6 +113,7 @@ def with_parameters(
 
     **Raises** `InputError` if a standard deviation is zero or negative, or if `where` picks no leaf of the system.
     """
+    check_model("with_parameters", model)
     if model.chosen is not None:
         raise InputError("with_parameters: this model estimates parameters already; choose them all in one `where`.")
     parameters = tuple(_of_system(p) for p in resolve(model, where))
@@ -175,6 +176,7 @@ def _walk(parameters, values, relative):
 
 def start_from(model: StateSpace, **physical) -> StateSpace:
     """The same model with other prior means, given in physical units by field (`front_B=9.0`, `v_y=0.1`)."""
+    check_model("start_from", model)
     by_field = {} if model.chosen is None else {p.field: p for p in model.chosen.parameters}
     unknown = [name for name in physical if name not in model.states]
     if unknown:
@@ -191,6 +193,7 @@ def start_from(model: StateSpace, **physical) -> StateSpace:
 
 def parameters_of(model: StateSpace, report) -> Parameters | None:
     """The parameters of a report (a state's, a mean's or a std's), by name: `.front.B`; None for a model without parameters."""
+    check_model("parameters_of", model)
     return None if model.chosen is None else model.chosen.of_report(report)
 
 
@@ -199,6 +202,7 @@ def put_parameters(model: StateSpace, report) -> Any:
 
     `report`: a NamedTuple or a mapping by field (`front_B`). **Raises** `InputError` if it lacks a parameter.
     """
+    check_model("put_parameters", model)
     if model.chosen is None:
         return model.system
     given, fields = as_mapping(report, "put_parameters: report"), [p.field for p in model.chosen.parameters]

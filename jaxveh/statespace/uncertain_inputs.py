@@ -13,7 +13,7 @@ from jaxveh._core.errors import InputError, check_positive, check_single
 from jaxveh._core.names import check_names, record_type
 from jaxveh.statespace.dependent_noise import around
 from jaxveh.statespace.independent import combine
-from jaxveh.statespace.model import LinearInput, Prior, StateSpace
+from jaxveh.statespace.model import LinearInput, Prior, StateSpace, check_model
 from jaxveh.statespace.noise import Gaussian
 from jaxveh.statespace.process import AbstractProcessNoise, join
 
@@ -34,6 +34,7 @@ def uncertain_inputs(
     **Raises** `InputError` for an unknown input, a number that is not positive, or a model with chosen parameters (make the
     inputs uncertain first).
     """
+    check_model("uncertain_inputs", model)
     times = dict(correlation or {})
     check_names("uncertain_inputs", std, model.inputs)
     check_names("uncertain_inputs: correlation", times, std)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from jaxveh._core.errors import check_kind
 from jaxveh.studies.summary import (
     at_front,
     baseline_of,
@@ -29,6 +30,7 @@ COMPARED = ("ratio", "95 % interval over seeds", "smaller in")
 
 def tables(found: Swept, values: Iterable[str] = ()) -> list[Table]:
     """Every table of a sweep for these values (default: all that are one number per run)."""
+    check_kind("tables: found", found, Swept, "sweeps.sweep and sweeps.read_sweep return one.")
     names = plain_values(found, values)
     made = [by_axis(found, names)]
     if 1 < int(np.prod([len(axis.labels) for axis in _listed(found)])) <= MOST_POINTS and len(_listed(found)) > 1:

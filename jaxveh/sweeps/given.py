@@ -32,6 +32,7 @@ class Given:
         self.seeds, self.shape = int(seeds), (*points, int(seeds))
         self.runs = int(np.prod(self.shape))
         self.grid, self.data, self.key = design.grid(), data, key
+        self.names = (*(("key",) if key is not None else ()), *(("data",) if data is not None else ()))
         self.keys = None if key is None else _on_the_host(jax.random.split(key, self.seeds))
         for name, leaf in parts.items():
             if np.shape(leaf)[: len(self.shape)] != self.shape:

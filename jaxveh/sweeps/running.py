@@ -12,7 +12,7 @@ import numpy as np
 from jax.sharding import Mesh
 from jax.sharding import PartitionSpec as P
 
-from jaxveh._core.errors import InputError, check_callable, check_kind, check_positive, check_whole
+from jaxveh._core.errors import InputError, check_callable, check_kind, check_positive, check_takes, check_whole
 from jaxveh._core.names import as_pairs, as_several
 from jaxveh._core.progress import Progress, check_progress, silent
 from jaxveh.sweeps.design import Design
@@ -73,11 +73,11 @@ def sweep(
     each other for ever (large batches of LAPACK routines with jax before 0.12; see `sweeps/workers.py`).
 
     **Raises** `InputError` for bad counts, neither a key nor data, data of another shape, a `run` that returns nothing named,
-    and a store that was begun with something else or that another sweep is writing.
-    **Warns** if a program may never end even on one device, with the remedy.
+    and a store that was begun with something else or that another sweep is writing. **Warns** if a program may never end.
     """
     units = dict(as_pairs({} if units is None else units, "units"))
     _check_kinds(run, design, patience, progress, units, note)
+    given = _given(run, design, seeds, key, data)
     if store is not None or (client, processes, part) != (None, None, None):
         if store is None or (memory, devices) != (None, None):
             raise InputError(
@@ -85,10 +85,16 @@ def sweep(
             )
         asked = {"batch": batch, "client": client, "processes": processes, "part": part, "patience": patience}
         asked |= {"units": units, "note": note}
-        return sweep_into(store, run, design, Given(design, seeds, key, data), progress=progress, **asked)
+        return sweep_into(store, run, design, given, progress=progress, **asked)
     devices = _devices(devices)
-    found = _in_memory(run, design, Given(design, seeds, key, data), batch, memory, devices, patience, progress)
+    found = _in_memory(run, design, given, batch, memory, devices, patience, progress)
     return dataclasses.replace(found, units=units, note=note)
+
+
+def _given(run: Callable, design: Design, seeds: int | None, key: Any, data: Any) -> Given:
+    given = Given(design, seeds, key, data)
+    check_takes("run", run, "point", *given.names)
+    return given
 
 
 def _check_kinds(run, design, patience, progress, units: dict[str, Any], note) -> None:

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.contracts import Checked, contract
-from jaxveh._core.errors import InputError, word_for
+from jaxveh._core.errors import InputError, check_kind, word_for
 from jaxveh._core.own_results import names, of_kind, states
 from jaxveh._core.parameter import check_parameters
 from jaxveh._core.parameter_table import WithParameters
@@ -141,6 +141,8 @@ def cornering_stiffness(tyre: AbstractTyre, contact: Contact) -> jax.Array:
 
     At zero slip it is the cornering stiffness of the book.
     """
+    check_kind("cornering_stiffness: tyre", tyre, AbstractTyre, "tyres.Linear(8e4) is one.")
+    check_kind("cornering_stiffness: contact", contact, Contact, "tyres.Contact(0.0, load=4000.0) is one.")
     slip = jnp.asarray(contact.slip_angle, jnp.result_type(float if contact.load is None else contact.load))
     return jax.jvp(
         lambda a: tyre.forces(contact._replace(slip_angle=a, lateral_slip=None)).F_y, (slip,), (jnp.ones_like(slip),)

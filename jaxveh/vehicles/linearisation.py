@@ -8,7 +8,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import check_has
+from jaxveh._core.errors import check_has, check_kind
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
 from jaxveh.vehicles.base import GRAVITY, AbstractVehicle
 from jaxveh.vehicles.fourteen_dof import FourteenDOF
@@ -35,6 +35,9 @@ def linear_single_track(car: Any, *, cg_height: Any = None) -> LinearSingleTrack
         car = inner
     if isinstance(car, LinearSingleTrack):
         return dataclasses.replace(car, cg_height=cg_height)
+    check_kind(
+        "linear_single_track: car", car, AbstractVehicle, "vehicles.from_specification makes one of a car's file."
+    )
     needed = ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg", "front", "rear")
     check_has("linear_single_track: car", car, needed)
     whole = car.whole if isinstance(car, FourteenDOF) else car

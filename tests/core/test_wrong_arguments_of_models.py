@@ -77,6 +77,7 @@ OTHERWISE = {
         "compare": {"methods": ("open_loop",), "car": FILE, "axis": -1}, "from_commonroad": {"specification": COMMONROAD},
     "state_space": {"estimate": lambda car: (car.front.D,), "prior": 0.1, "walk": 0.1},
     "steering_without_sideslip": {"car": vehicles.linear_single_track(CAR)}, "commonroad_limits": {"specification": COMMONROAD},
+    "open_loop_of_file": {"car": FILE},
     "solve": {"problem": fitting.pose_shooting(MODEL, SEGMENTS, FORCE), "start": None},
     "bootstrap": {"problem": fitting.pose_shooting(MODEL, SEGMENTS, FORCE)},
     "pose_shooting": {"prior": 0.1, "where": FORCE}, "pose_likelihood": {"prior": 0.1}, "pose_prediction_error": {"prior": 0.1},

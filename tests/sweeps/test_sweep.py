@@ -178,6 +178,11 @@ def test_two_devices_make_what_one_makes():
         (lambda: sweeps.Design(a=[1.0, np.nan]), r"axis a = .*must be finite"),
         (lambda: sweeps.Design(a=["PF", "UKF"]), "axis a = .*must be a sequence of numbers, or a mapping from labels"),
         (lambda: sweeps.sweep(run, DESIGN, 3), "sweep: give seeds and a key, .* or data"),
+        (lambda: sweeps.sweep(lambda point: {}, DESIGN, 3, KEY), r"run takes \(point\): must take \(point, key\)"),
+        (
+            lambda: sweeps.sweep(run, DESIGN, 3, KEY, data=np.ones((2, 3, 3))),
+            r"run takes .*: must take \(point, key, data\)",
+        ),
         (lambda: sweeps.sweep(run, DESIGN, key=KEY), "seeds = None: must be a whole number"),
         (lambda: sweeps.sweep(run, DESIGN, 0, KEY), "seeds = 0: must be a whole number of at least 1"),
         (lambda: sweeps.sweep(run, DESIGN, 1, KEY, batch=0), "batch = 0: must be a whole number"),

@@ -10,7 +10,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_flags, check_positive, path_of
+from jaxveh._core.errors import InputError, check_flags, check_has, check_kind, check_positive, path_of
 from jaxveh._core.version import VERSION
 from jaxveh.estimators.geometry.learner import RELATIVE, UNITS, Learner
 from jaxveh.estimators.prepared import Prepared
@@ -55,6 +55,9 @@ class Learned:
 
 def numbers_learned(said: Any) -> Learned:
     """The last values of a learner, from `Answers` along a log or from a live `Answer`."""
+    advice = "estimators.geometry.estimate and live return them."
+    check_has("numbers_learned: said", said, ("mean", "std", "known"), advice)
+    check_has("numbers_learned: said.mean", said.mean, UNITS, advice)
     last = lambda part, name: np.asarray(getattr(part, name)).reshape(-1)[-1]
     return Learned(
         {
@@ -71,6 +74,8 @@ def start_from(method: Learner | Prepared, learned: Learned) -> Learner | Prepar
     """
     if isinstance(method, Prepared):
         return dataclasses.replace(method, inner=start_from(method.inner, learned))
+    check_kind("start_from: method", method, Learner, "A METHODS of estimators.geometry makes one of a car's file.")
+    check_kind("start_from: learned", learned, Learned, "numbers_learned and read_learned return them.")
     changes: dict[str, Any] = {}
     for name, entry in learned.entries.items():
         if entry.valid:
@@ -89,6 +94,7 @@ def write_learned(learned: Learned, path: str | os.PathLike, *, overwrite: bool 
     **Raises** `InputError` where the file exists and `overwrite` is False.
     """
     check_flags(overwrite=overwrite)
+    check_kind("write_learned: learned", learned, Learned, "numbers_learned returns it.")
     lines = [
         "# Parameters of a car that jaxveh has learned. SI units; valid: the standard deviation is small enough to use them.",
         f"version = {kit.toml_string(VERSION)}",

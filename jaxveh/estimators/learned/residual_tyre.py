@@ -8,7 +8,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh._core.errors import check_has, check_kind
 from jaxveh._core.parameter import parameter, positive
+from jaxveh.statespace import kit
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact, Forces, cornering_stiffness
 from jaxveh.tyres import kit as tyres
 
@@ -60,6 +62,7 @@ def with_residual_tyres(car: Any, key: jax.Array, *, units: int = 6) -> Any:
 
     **Raises** `InputError` for tyres with states of their own.
     """
+    check_has("with_residual_tyres: car", car, ("static_loads", "front", "rear"), "vehicles.SingleTrack has them.")
     front_key, rear_key = jax.random.split(key)
     loads = car.static_loads()
     return eqx.tree_at(
@@ -71,7 +74,18 @@ def with_residual_tyres(car: Any, key: jax.Array, *, units: int = 6) -> Any:
 
 def network_weights(model: Any) -> tuple[jax.Array, ...]:
     """The weights of both tyres' networks, for a model whose vehicle has such tyres: a `where` for `train`."""
+    kit.check_model("network_weights", model)
+    check_has(
+        "network_weights: model.system", model.system, ("vehicle",), "estimators.state_space returns such a model."
+    )
     car = model.system.vehicle
+    for axle in ("front", "rear"):
+        check_kind(
+            f"network_weights: {axle}",
+            getattr(car, axle, None),
+            ResidualTyre,
+            "with_residual_tyres puts them on a car.",
+        )
     return tuple(w for tyre in (car.front, car.rear) for w in (tyre.inner, tyre.bias, tyre.outer, tyre.load_share))
 
 

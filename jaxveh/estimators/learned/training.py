@@ -12,12 +12,12 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.parameter import pick, put, resolve
 from jaxveh._core.progress import Progress, silent
-from jaxveh._core.recording import Recording
-from jaxveh.estimators.contract import PIECE_LENGTH, WARM_UP, cut_pieces
+from jaxveh._core.recording import Recording, check_recording
+from jaxveh.estimators.contract import PIECE_LENGTH, WARM_UP, cut_pieces, several_of
 from jaxveh.filters import AbstractFilter
 from jaxveh.filters import scan as scan_filter
 from jaxveh.io import kit as io
-from jaxveh.statespace import StateSpace
+from jaxveh.statespace import StateSpace, kit
 
 TOLD = 25
 """Number of steps between two calls of `progress`."""
@@ -58,7 +58,7 @@ def train(
     Needs the extra `learn`. **Raises** `InputError` for recordings too short for a piece and arguments out of range.
     """
     optax = io.require("optax", "training through a filter", "learn")
-    _check(learning_rate=learning_rate, piece=piece, warm_up=warm_up)
+    _check(filter, model, learning_rate=learning_rate, piece=piece, warm_up=warm_up)
     for name, value in (("steps", steps), ("batch", batch)):
         check_whole(name, value, 1)
     filter.check(model)
@@ -99,7 +99,8 @@ def _change(search: Any, slope: Any, memory: Any) -> tuple[Any, Any]:
         return search.update(slope, memory)
 
 
-def _check(**values: float) -> None:
+def _check(filter: AbstractFilter, model: StateSpace, **values: float) -> None:
+    kit.check_told(filter, model)
     for name, value in values.items():
         check_positive(name, value)
 
@@ -130,9 +131,11 @@ def _spread(p: Any, prior: float | Mapping[str, float]) -> float:
 
 def _pieces(model: StateSpace, recordings: Recording | Sequence[Recording], piece: float, warm_up: float):
     """Rows of all pieces, (pieces, T) in each leaf, and the number of warm-up rows; pieces are as long as the shortest."""
-    logs = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    logs = several_of(recordings)
     if not logs:
         raise InputError("train: no recording to learn from.")
+    for log in logs:
+        check_recording("train", log)
     cut = [cut_pieces(log, piece, warm_up) for log in logs]
     rows = min(len(one) for pieces, _ in cut for one in pieces)
     first = max(count for _, count in cut)

@@ -13,7 +13,7 @@ from jaxveh.estimators.navigation.method import Navigation, navigation_model
 from jaxveh.estimators.navigation.multi_rate import multi_rate_of
 from jaxveh.estimators.navigation.of_car import navigation, navigation_of
 from jaxveh.estimators.navigation.system import Navigator, Parts
-from jaxveh.estimators.quantity import estimate_of, live_of
+from jaxveh.estimators.quantity import check_drive, estimate_of, live_of
 from jaxveh.io import CarSpecification
 
 NAME = "navigation"
@@ -82,7 +82,7 @@ __all__ = [
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
     """The satellites' last speed and course, as if the car had no sideslip; NaN before the first fix."""
-    del car
+    check_drive(f"{NAME}: do_nothing", car, recording)
     said = {"v_x": _held(recording, "speed"), "yaw": _held(recording, "course")}
     return said | dict.fromkeys(("v_y", "sideslip"), np.zeros(len(recording)))
 

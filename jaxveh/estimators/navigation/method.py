@@ -9,6 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from jaxveh._core.errors import check_kind
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import row_of
 from jaxveh.estimators.method import AbstractMethod, answer
@@ -40,6 +41,9 @@ FORGOTTEN = ("v_x", "v_y", "yaw", "lane_offset", "lane_heading")
 
 def navigation_model(system: Navigator) -> StateSpace:
     """The state space for any Gaussian filter, with rows from `Cleaning`."""
+    check_kind(
+        "navigation_model: system", system, Navigator, "navigation_of makes one of a car's file: its field system."
+    )
     states = states_of(system.parts)
     kind = state_type(system.parts)
     return StateSpace(

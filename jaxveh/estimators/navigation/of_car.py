@@ -12,6 +12,7 @@ from jaxveh.estimators.navigation.method import Navigation, navigation_model
 from jaxveh.estimators.navigation.system import PLAIN, Navigator, Parts
 from jaxveh.estimators.rear_steer import with_rear_steer
 from jaxveh.io import AxleTyre, CarSpecification
+from jaxveh.io import kit as io
 from jaxveh.statespace import start_from
 from jaxveh.vehicles import GRAVITY
 
@@ -36,6 +37,7 @@ def navigation_of(car: CarSpecification, parts: Parts = PLAIN, **numbers: Any) -
     For a file without `antenna_position` the antenna is at the centre of gravity; missing delays are those of a usual series car
     (`delays`). `sensor_position` is that of the inertial unit.
     """
+    io.check_car_file("navigation_of", car)
     parts = parts._replace(rear_steer=not car.steers_front_alone)
     antenna = car.antenna_position or (0.0, 0.0, 0.0)
     unit = car.sensor_position or (0.0, 0.0, 0.0)

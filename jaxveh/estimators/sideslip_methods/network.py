@@ -25,6 +25,7 @@ from jaxveh.estimators.sideslip_methods.common import (
 )
 from jaxveh.estimators.two_axles import linear_axles_of
 from jaxveh.io import CarSpecification
+from jaxveh.io import kit as io
 from jaxveh.vehicles import GRAVITY
 
 TIMES = (0.1, 0.4, 1.5)
@@ -121,6 +122,7 @@ def trained_arrays() -> tuple[np.ndarray, ...]:
 
 def sideslip_network(car: CarSpecification, layers: eqx.nn.MLP) -> SideslipNetwork:
     """The method with these `layers` for a car's file."""
+    io.check_car_file("sideslip_network", car)
     told = linear_axles_of(car)
     wheelbase = told["front_axle_to_cg"] + told["rear_axle_to_cg"]
     compliance = lambda other, stiffness: told["mass"] * told[other] / (wheelbase * told[stiffness])

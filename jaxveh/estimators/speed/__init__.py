@@ -8,7 +8,7 @@ from jaxveh._core.recording import Recording
 from jaxveh.estimators.car_file import keys_of
 from jaxveh.estimators.delays import SHORTEST_DELAY, satellite_delay, unit_delay
 from jaxveh.estimators.method_of_car import MethodOfCar
-from jaxveh.estimators.quantity import estimate_of, live_of
+from jaxveh.estimators.quantity import check_drive, estimate_of, live_of
 from jaxveh.estimators.rear_steer import with_rear_steer
 from jaxveh.estimators.speed.abs_peaks import AdaptiveNonlinear
 from jaxveh.estimators.speed.accelerometer import AccelerometerIntegral
@@ -94,7 +94,7 @@ RECOMMENDED = "slip_aware"
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
     """The mean of the wheels' speeds (m/s), held where no wheel has a measurement."""
-    del car
+    check_drive(f"{NAME}: do_nothing", car, recording)
     wheels = [np.asarray(recording[need.channel], float) for need in WHEEL_SPEEDS if need.channel in recording]
     if not wheels:
         return {"v_x": np.full(len(recording), np.nan)}

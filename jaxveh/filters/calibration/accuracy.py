@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_kind
 from jaxveh.filters.calibration.monte_carlo import Runs
 from jaxveh.statespace import PosteriorBound
 
@@ -39,6 +39,8 @@ def rmse_beside_bound(runs: Runs, bound: PosteriorBound) -> Accuracy:
 
     **Raises** `InputError` where the states or times of the two do not agree, or there are fewer than two runs.
     """
+    check_kind("runs", runs, Runs, "filters.monte_carlo returns them.")
+    check_kind("bound", bound, PosteriorBound, "statespace.posterior_cramer_rao returns one.")
     if runs.states._fields != bound.std._fields:
         raise InputError(
             f"bound: its states are {', '.join(bound.std._fields)}, the runs' {', '.join(runs.states._fields)}: must agree."

@@ -9,13 +9,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_whole
+from jaxveh._core.errors import InputError, check_kind, check_whole
 from jaxveh._core.progress import Progress
 from jaxveh.statespace import StateSpace
 
 
 def check_truth(model: StateSpace, truth: StateSpace) -> None:
     """Raise `InputError` unless the model that draws has the states, channels and inputs of the filter's model."""
+    check_kind("truth", truth, StateSpace, "estimators.state_space returns one.")
     for what in ("states", "channels", "inputs"):
         ours, theirs = getattr(model, what), getattr(truth, what)
         if ours != theirs:

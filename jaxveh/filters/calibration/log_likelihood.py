@@ -15,7 +15,7 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.filters.calibration.batches import in_batches
 from jaxveh.filters.calibration.monte_carlo import raise_failed
-from jaxveh.statespace import AbstractFilter, StateSpace, scan
+from jaxveh.statespace import AbstractFilter, StateSpace, kit, scan
 
 GOOD_STD = (1.0, 1.7)
 """The range in which the standard deviation of the log-likelihood should lie for particle marginal Metropolis-Hastings
@@ -74,6 +74,7 @@ def log_likelihood_spread(
     check_flags(throw=throw)
     check_whole("runs", runs, 2)
     check_key("log_likelihood_spread", key)
+    kit.check_told(filter, model)
     model = strong(model)
     filter.check(model)
     rows = model.rows(recording)

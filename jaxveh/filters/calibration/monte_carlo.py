@@ -62,6 +62,7 @@ def monte_carlo(
     `throw=False`.
     """
     check_flags(throw=throw)
+    kit.check_told(filter, model)
     model, truth = strong(model), strong(model if truth is None else truth)
     check_whole("runs", runs)
     check_key("monte_carlo", key)

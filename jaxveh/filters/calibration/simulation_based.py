@@ -81,6 +81,7 @@ def simulation_based_calibration(
     **Arguments**: as `monte_carlo`. **Raises** likewise.
     """
     check_flags(throw=throw)
+    kit.check_told(filter, model)
     model, truth = strong(model), strong(model if truth is None else truth)
     check_whole("runs", runs)
     check_key("simulation_based_calibration", key)

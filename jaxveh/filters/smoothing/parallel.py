@@ -42,6 +42,7 @@ def smooth_parallel(
         raise InputError(
             f"smooth_parallel: {word_for(filter)}: must be Kalman() or Iterated(...), not wrapped, with Covariance()."
         )
+    kit.check_told(filter, model)
     model = strong(model)
     filter.check(model)
     if model.angles and filter.linearisations == 0:
