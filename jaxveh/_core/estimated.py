@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.labelled import TIME, Labelled, Variable, make_again, run_axes, time_again, time_axis
-from jaxveh._core.names import as_mapping
+from jaxveh._core.names import as_mapping, check_names
 from jaxveh._core.overview import Lazy, Overview, count_of, is_known, number, span, stretch
 from jaxveh._core.packing import Packing, unpack
 from jaxveh._core.result import Result
@@ -33,6 +33,13 @@ class Estimated(Kept):
     by_row: ClassVar[tuple[str, ...]] = ("mean", "std")
     by_run: ClassVar[tuple[str, ...]] = ()
     records: ClassVar[dict[str, Any]] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        """The mean of a quantity by name, (T,)."""
+        self._need("mean")
+        mean = as_mapping(getattr(self, "mean", None), "mean")
+        check_names(f"{type(self).__name__}: mean", [name], mean)
+        return mean[name]
 
     def to_pandas(self) -> Any:
         """Return a `pandas.DataFrame` with a column `time`, and for each quantity its mean `name` and `name_std`.

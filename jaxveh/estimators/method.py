@@ -120,10 +120,6 @@ class Answers(Estimated, eqx.Module):
     known: Any
     result: Any
 
-    def __getitem__(self, name: str):
-        """The mean of a quantity by name, (T,)."""
-        return getattr(self.mean, name)
-
 
 def answer(mean: Mapping[str, Any], std: Mapping[str, Any] | None = None, known: Any = True) -> Answer:
     """An `Answer` of scalars by name. `std`: standard deviations by name, NaN where not given; `known`: one boolean, or

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, path_of
+from jaxveh._core.errors import InputError, check_has, path_of
 from jaxveh.io import kit, replacing_file
 
 # M. Okabe and K. Ito, Color Universal Design (2008); the truth is black.
@@ -95,6 +95,7 @@ def save(figure: Any, path: str | os.PathLike, *, dpi: int = DPI) -> Path:
 
     **Raises** `InputError` for another suffix, or if the file cannot be written.
     """
+    check_has("plots.save: figure", figure, ("savefig",), "The plots of this room return one.")
     path = path_of(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: suffix {path.suffix!r}; a figure must end in one of {', '.join(SUFFIXES)}.")

@@ -77,10 +77,6 @@ class Estimate(Estimated, eqx.Module):
     parameters: Any
     parameters_std: Any
 
-    def __getitem__(self, name: str):
-        """The mean of a reported quantity by name, (T,)."""
-        return getattr(self.mean, name)
-
 
 def run(
     filter, model: StateSpace, recording: Recording, *, key=None, keep: Sequence[str] = SHOWN, throw: bool = True

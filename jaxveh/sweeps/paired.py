@@ -46,6 +46,8 @@ def compare(a: np.ndarray, b: np.ndarray, *, axis: int = -1, level: float = 0.95
     check_numbers("a", a)
     check_numbers("b", b)
     a, b = np.asarray(a, float), np.asarray(b, float)
+    if a.ndim == 0:
+        raise InputError("compare: a is one number: must be the errors of several seeds, at least two.")
     check_whole("axis", axis, -a.ndim, most=a.ndim - 1)
     if a.shape != b.shape:
         raise InputError(f"a has shape {a.shape}, b {b.shape}: must be the same seeds and points.")

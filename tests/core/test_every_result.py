@@ -31,6 +31,8 @@ from jaxveh import (
     tyres,
     vehicles,
 )  # fmt: skip
+from jaxveh._core.estimated import Estimated
+from jaxveh._core.names import as_mapping
 from jaxveh._core.parameter import resolve
 from jaxveh._core.shown import Kept, Shown
 
@@ -289,6 +291,25 @@ class Page(html.parser.HTMLParser):
 
     def handle_data(self, data):
         self.words.append(data)
+
+
+ESTIMATES = [name for name in ALL if name.partition(",")[0] in ("Recording", "Estimate", "Answers", "SmoothedEstimate")]
+
+
+def test_there_is_one_of_each_estimate():
+    assert {name for name, one in RESULTS.items() if issubclass(one, Estimated)} <= {*ESTIMATES, *NO_RESULT}
+
+
+@pytest.mark.parametrize("name", ESTIMATES)
+def test_a_quantity_is_found_by_its_name_only(made, name):
+    """Names of a tuple's methods (`count`, `index`) and of its private parts are none."""
+    one = made(name)
+    kept = one.mean if hasattr(one, "mean") else one.channels
+    for quantity in () if kept is None else as_mapping(kept):
+        np.testing.assert_array_equal(one[quantity], as_mapping(kept)[quantity])
+    for wrong in ("count", "index", "_fields", "nothing", 0, -1, slice(1), None, ["y"], T):
+        with pytest.raises(InputError, match="unknown name|was not kept|no quantity|names = |mean"):
+            one[wrong]
 
 
 PAGE = {"div", "p", "b", "table", "thead", "tbody", "tr", "th", "td", "details", "summary", "svg", "path"}

@@ -201,6 +201,8 @@ def test_the_same_figure_is_the_same_file(tmp_path, suffix):
 def test_save_refuses_other_suffixes(tmp_path):
     with pytest.raises(InputError, match=r"'\.gif'"):
         plots.save(plots.recording(drive()), tmp_path / "a.gif")
+    with pytest.raises(InputError, match="plots.save: figure = 'a.png': must be an object with savefig"):
+        plots.save("a.png", plots.recording(drive()))
     assert list(tmp_path.iterdir()) == []
 
 

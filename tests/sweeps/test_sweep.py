@@ -178,6 +178,7 @@ def test_two_devices_make_what_one_makes():
         (lambda: sweeps.Design(a=[1.0, np.nan]), r"axis a = .*must be finite"),
         (lambda: sweeps.Design(a=["PF", "UKF"]), "axis a = .*must be a sequence of numbers, or a mapping from labels"),
         (lambda: sweeps.sweep(run, DESIGN, 3), "sweep: give seeds and a key, .* or data"),
+        (lambda: sweeps.compare(1.0, 2.0), "a is one number: must be the errors of several seeds"),
         (lambda: sweeps.sweep(lambda point: {}, DESIGN, 3, KEY), r"run takes \(point\): must take \(point, key\)"),
         (
             lambda: sweeps.sweep(run, DESIGN, 3, KEY, data=np.ones((2, 3, 3))),

@@ -34,10 +34,6 @@ class SmoothedEstimate(Estimated, eqx.Module):
     trajectories: Any = None
     weights: Any = None
 
-    def __getitem__(self, name: str):
-        """The mean of a reported quantity by name, (T,)."""
-        return getattr(self.mean, name)
-
     def _lead(self) -> int:
         return self.filtered._lead()
 
