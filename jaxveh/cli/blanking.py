@@ -53,9 +53,13 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
     missing = [name for name in NEEDED if name not in recording]
     if missing:
         likely = io.likely_words(missing, recording.names)
+        turns = "v_x" in missing and any(name.startswith("omega_") for name in recording.names)
+        wheels = (
+            ' A wheel\'s rotation (omega_fl) is mapped as wheel_speed_fl, with scale = the radius and unit = "m/s".'
+        )
         raise InputError(
             f"{LACKS}{', '.join(missing)}; it must have {', '.join(NEEDED)}.{' ' if likely else ''}{likely} Map their "
-            "columns with --channels (jaxveh schema channels)."
+            f"columns with --channels (jaxveh schema channels).{wheels if turns else ''}"
         )
     for name in (*INPUTS, *(name for name in ("steer", *REAR_ANGLES) if name in recording)):
         recording = fill_short(recording, name, max_gap)

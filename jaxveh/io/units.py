@@ -83,6 +83,7 @@ def convert(values, unit: str, target: str, what: str) -> np.ndarray:
         return np.asarray(values)
     if _GRAD.match(unit):
         raise InputError(f"{what}: unit {said!r} may be degrees or gradians. Write `deg` (in a channel map), or `gon`.")
+    _check_no_rotation(said, target, what)
     registry = _registry()
     try:
         source, wanted = _parse(unit), _parse(_ALIASES.get(target, target))
@@ -96,6 +97,25 @@ def convert(values, unit: str, target: str, what: str) -> np.ndarray:
             "Correct the unit in the channel map, or map another column."
         )
     return np.asarray(registry.Quantity(np.asarray(values, dtype=np.float64), source).to(wanted).magnitude)
+
+
+def _check_no_rotation(said: str, target: str, what: str) -> None:
+    """Raise `InputError` for a wheel's rotation in place of its speed, with the scale that makes it one."""
+    if target != "m/s":
+        return
+    registry = _registry()
+    try:
+        turning = _parse(_spelled(said, "rad/s"))
+        root = registry.get_root_units(turning)[1]
+    except Exception:  # as in `convert`, which says so
+        return
+    if root == registry.get_root_units(_parse("rad/s"))[1]:
+        factor = registry.Quantity(1.0, turning).to("rad/s").magnitude
+        raise InputError(
+            f"{what}: unit {said!r} is of another quantity; it must be convertible to {target!r}. A wheel's rotation times its "
+            f'rolling radius is its speed: in the channel map, scale = {factor:.9g} times the radius (m), and unit = "m/s"; '
+            "or name the channel omega_fl, omega_fr, omega_rl, omega_rr."
+        )
 
 
 @functools.cache

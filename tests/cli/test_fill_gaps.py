@@ -121,3 +121,11 @@ def test_the_angles_of_steered_rear_wheels_are_read_seen_and_filled(steering):
     log = log_with(np.zeros(ROWS, bool)).replace(**{name: np.where(missing, np.nan, 0.1) for name in angles})
     filled = blanking.fill_gaps(log, 0.3)
     assert all(np.isfinite(np.asarray(filled[name])[:-1]).all() for name in angles)
+
+
+@pytest.mark.parametrize("names", [("omega_fl",), ("omega_rl", "omega_rr"), ("a_x",)])
+def test_a_log_with_rotations_alone_says_how_they_are_speeds(names):
+    log = Recording(np.arange(5.0), {name: np.ones(5) for name in ("yaw_rate", *names)})
+    with pytest.raises(InputError, match="the log has no v_x") as told:
+        fill_gaps(log, None)
+    assert ("as wheel_speed_fl, with scale" in str(told.value)) == names[0].startswith("omega")

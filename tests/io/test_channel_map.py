@@ -1,5 +1,7 @@
 """Channel maps: names, units, signs; each mistake is one clear error."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -236,3 +238,20 @@ def test_missing_pint(log, toml, monkeypatch):
         InputError, match=r'pint is not installed, and converting units needs it: run `pip install "jaxveh'
     ):
         io.read_recording(log, toml(GOOD))
+
+
+@pytest.mark.parametrize("unit", ["rpm", "rad/s", "deg/s", "1/min", "rev/min", "U/min", "rps"])
+@pytest.mark.parametrize("corner", ["fl", "rr"])
+def test_a_wheels_rotation_in_place_of_its_speed_says_how_to_map_it(tmp_path, toml, unit, corner):
+    """What the message says to write gives the speed."""
+    name, radius = f"wheel_speed_{corner}", 0.31
+    path = tmp_path / "wheels.csv"
+    path.write_text(f"time,{name} [{unit}]\n0,100\n1,200\n")
+    with pytest.raises(InputError, match="is of another quantity.*omega_") as told:
+        io.read_recording(path)
+    scale = float(re.search(r"scale = (\S+) times the radius", str(told.value))[1]) * radius
+    mapped = io.read_recording(
+        path, channels=toml(f'[channels.{name}]\ncolumn = "{name}"\nscale = {scale}\nunit = "m/s"\n')
+    )
+    turning = convert(np.array([100.0, 200.0]), unit, "rad/s", name)
+    np.testing.assert_allclose(mapped[name], radius * turning, rtol=1e-6)
