@@ -127,5 +127,5 @@ def test_the_angles_of_steered_rear_wheels_are_read_seen_and_filled(steering):
 def test_a_log_with_rotations_alone_says_how_they_are_speeds(names):
     log = Recording(np.arange(5.0), {name: np.ones(5) for name in ("yaw_rate", *names)})
     with pytest.raises(InputError, match="the log has no v_x") as told:
-        fill_gaps(log, None)
+        blanking.fill_gaps(log, None)
     assert ("as wheel_speed_fl, with scale" in str(told.value)) == names[0].startswith("omega")
