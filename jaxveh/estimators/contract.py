@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import numpy as np
 
-from jaxveh._core.errors import InputError, is_concrete
+from jaxveh._core.errors import InputError, check_kind, is_concrete
 from jaxveh._core.labelled import Labelled
 from jaxveh._core.overview import Overview
 from jaxveh._core.recording import Recording, check_recording, gap_to_fill
@@ -191,12 +191,16 @@ def in_words(name: str) -> str:
     return name
 
 
-def model_of(who: str, source: Any, model: Callable[[Any], StateSpace]) -> StateSpace:
-    """The state space of a `source`: that of a calibration, a model itself, or otherwise `model(car)`.
+def model_of(who: str, source: Any, model: Callable[[Any], StateSpace], kind: type = object) -> StateSpace:
+    """The state space of a `source`: that of a calibration, a model itself, whose system must be of this `kind`, or otherwise
+    `model(car)`.
 
-    **Raises** `InputError` for a calibration of another estimator.
+    **Raises** `InputError` for a calibration of another estimator, and a model of another system.
     """
     if isinstance(source, StateSpace):
+        check_kind(
+            f"{who}: the system of source, a StateSpace,", source.system, kind, f"estimators.{who}.model makes one."
+        )
         return source
     if not isinstance(source, Calibration):
         return model(source)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_kind
 from jaxveh.estimators.car_file import lean_of
 from jaxveh.estimators.rear_axle import USUAL_WHEELBASE, RearAxle
 from jaxveh.estimators.rear_steer import rear_steer_of
 from jaxveh.io import CarSpecification
+from jaxveh.io import kit as io
 from jaxveh.sensors import LowPass
+from jaxveh.statespace import kit
 from jaxveh.vehicles import GRAVITY
 
 CG_HEIGHT_SHARE = 0.19
@@ -52,6 +54,10 @@ def chosen_parameters(model: Any):
     of those logs (noises alone, sensors, stiffness, all of these), the F1TENTH's first 30 s would keep the file's tyres (17.7
     instead of 4.2 degrees), the reversed Genesis would fit the noises alone (0.62, 0.63), and the other logs all parameters.
     """
+    kit.check_model("chosen_parameters", model)
+    check_kind(
+        "chosen_parameters: model.system", model.system, RearAxle, "estimators.sideslip.model returns such a model."
+    )
     s, noise = model.system, model.process_noise.law.std
     axle = [s.stiffness, s.grip, s.shape]
     body = [s.yaw_inertia, s.cg_height]
@@ -69,6 +75,7 @@ def car_of(car: CarSpecification | RearAxle) -> RearAxle:
     """The rear axle of a car's file without calibration; missing values are scaled with the car's size."""
     if isinstance(car, RearAxle):
         return car
+    io.check_car_file("sideslip", car)
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     load = car.mass * GRAVITY * a / (a + b)
     size = (a + b) / USUAL_WHEELBASE

@@ -13,7 +13,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_flags, check_one_of, is_concrete
+from jaxveh._core.errors import InputError, check_flags, check_kind, check_one_of, is_concrete
 from jaxveh._core.parameter import pick, prior_spread
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
@@ -223,6 +223,7 @@ def little_told(source: Calibration) -> tuple[str, ...]:
     """Names of the parameters that the calibration's logs hardly determine: their standard deviation is still `LITTLE` of the
     prior's, or more; the bands allow for it. A value may still be far from the prior's: the fit uses it to explain what the model
     lacks."""
+    check_kind("little_told: source", source, Calibration, "estimators.sideslip.calibrate returns one.")
     chosen = source.fit.chosen
     prior = np.stack([np.asarray(one) for one in prior_spread(chosen, pick(source.model, chosen), SPREADS)])
     left = np.sqrt(np.diag(np.asarray(source.fit.covariance)))
@@ -275,7 +276,7 @@ def estimate(
         return follow(NAME, method_of(NAME, METHODS, source, method or RECOMMENDED), recording)
     check_needs(NAME, needs, recording)
     _check_one_clock(recording)
-    one = model_of(NAME, source, model)
+    one = model_of(NAME, source, model, RearAxle)
     recording = with_rear_angle(NAME, one.system.rear_steer, recording)
     if smoothed:
         recording = on_time(recording, one.system)
@@ -315,7 +316,7 @@ def live(
     if method is not None or isinstance(source, AbstractMethod):
         _check_alone(filter, key)
         return LiveMethod(method_of(NAME, METHODS, source, method or RECOMMENDED))
-    one, used = model_of(NAME, source, model), filter or Extended()
+    one, used = model_of(NAME, source, model, RearAxle), filter or Extended()
     members = _members(source, one) if kit.smoothing_of(used) is Smoothing.gaussian else None
     rear_steer, cleaning = one.system.rear_steer, _cleaning(one)
     return Live(used, one, cleaning if rear_steer is None else Chained(rear_steer, cleaning), key, members)

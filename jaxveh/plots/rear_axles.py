@@ -90,7 +90,7 @@ def rear_axle_points(source: Any, estimate: Any, recording: Recording, *, least_
     check_has("plots.rear_axle: estimate", estimate, ("mean",), advice)
     check_has("plots.rear_axle: estimate.mean", estimate.mean, needed, advice)
     check_recording("plots.rear_axle", recording)
-    system = estimators.model_of(sideslip.NAME, source, sideslip.model).system
+    system = estimators.model_of(sideslip.NAME, source, sideslip.model, RearAxle).system
     a_x = np.nan_to_num(np.asarray(recording["a_x"])) if "a_x" in recording else np.zeros(len(recording))
     u = SimpleNamespace(a_x=jnp.asarray(a_x), v_x=jnp.asarray(recording["v_x"]))
     slip, load = np.asarray(estimate.mean.slip_angle_rear), np.asarray(system.loads(u)[1])

@@ -107,16 +107,7 @@ LATER = {
     ("diagnostics.delay_of_rows", "truth"): "a traced formula of arrays",
     ("filters.rmse_beside_bound", "bound"): "needs runs, which take long; `runs` is looked at first",
     ("plots.rig_fit", "rig"): "needs a fit, which takes long; `fit` is looked at first",
-    **dict.fromkeys(
-        [
-            *(("estimators.sideslip." + name, "car") for name in ("calibrate", "car_of", "model")),
-            *(("estimators.sideslip." + name, "source") for name in ("estimate", "live", "little_told")),
-            *(("plots." + name, "source") for name in ("rear_axle", "rear_axle_points")),
-            ("estimators.sideslip.chosen_parameters", "model"),
-        ],
-        "still an AttributeError",
-    ),
-}  # fmt: skip
+}
 """What is not looked at, with the reason."""
 
 TOOLS = ("kit", "numerics", "experiments", "studies.figures")
