@@ -28,7 +28,7 @@ STEPS, TOLERANCE = 60, 0.02
 SLIDING = ({"grip": 1.02, "slip_error": 3.0, "stiffening": 10.0}, {"grip": 0.77, "slip_error": 5.0, "stiffening": 30.0})
 """Starts of further searches: the grip over the largest force in use, and slow errors over their usual values."""
 
-OVERCONFIDENCE = 16.0
+OVERCONFIDENCE = 24.0
 """The likelihood's information is divided by this, and also by the `disagreement` of the logs' halves where that is above one:
 balances of neighbouring rows are correlated but count as independent, and where the equations are wrong, one half finds values
 that the other excludes. Chosen together with `parameter_bands.WIDER`, see there.

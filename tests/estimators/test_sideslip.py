@@ -431,11 +431,11 @@ USED = {
 class Found(NamedTuple):
     """As much of an estimate as a score looks at."""
 
-    v_y: np.ndarray
+    mean: types.SimpleNamespace
     std: types.SimpleNamespace
 
     def __getitem__(self, name):
-        return getattr(self, name)
+        return getattr(self.mean, name)
 
 
 @pytest.mark.parametrize("entry", dataclasses.fields(io.CarSpecification), ids=lambda entry: entry.name)
@@ -462,7 +462,7 @@ def test_what_a_cars_file_says_is_used_or_named(entry):
         time = np.arange(0.0, 2.0, 0.01)
         wave, ones = np.sin(time), np.ones_like(time)
         std = {"v_y": 0.1 * ones, "sideslip": 0.01 * ones}
-        found = Found(0.1 * wave, types.SimpleNamespace(**std))
+        found = Found(types.SimpleNamespace(v_y=0.1 * wave), types.SimpleNamespace(**std))
         steer = "steering_wheel" if entry.name == "steering_ratio" else "steer"
         log = Recording(time, {"v_x": 20 * ones, "v_y": 0.2 * wave, steer: 0.02 * wave, "yaw_rate": 0.1 * wave})
         score = lambda car: repr(estimators.sideslip.score(car, found, log))
