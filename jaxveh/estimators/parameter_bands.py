@@ -36,11 +36,11 @@ logs need for 88 and 89 % in every setting:
 | 16 | 1.17, 1.09 | 1.07, 1.11 | 1.05, 1.09 |
 | 24 | 1.12, 1.05 | 1.03, 1.08 | 0.97, 1.00 |
 
-No pair has both 97.5 and 89 %; 16 with 1.1 had 97.6 % on the drives, 88.7 % or more on the Ferrari, 89.4 % or more on the F1TENTH.
-That was before `rear_axle_fit.ALIKE`, with which the same pair has 98.2 % on 92 other drives (97.9 before), 90 % or more on the
-Ferrari and 87.6 % or more on the F1TENTH; 24 with 1.05 has @D % on these drives, @G % or more and 88.8 % or more. Without the
-F1TENTH any `OVERCONFIDENCE` does as well (8 with 1.175: 86.4 % on the F1TENTH). Without the halves' `disagreement`, at 8, the drives
-allow 1.37, the F1TENTH needs 1.61."""
+No pair has both 97.5 and 89 %; 16 with 1.1 had 97.6 % on the drives, 88.7 % or more on the Ferrari, 89.4 % or more on the
+F1TENTH. That was before `rear_axle_fit.ALIKE`, with which the same pair has 98.2 % on 92 other drives (97.9 before), 90 % or more
+on the Ferrari and 87.6 % or more on the F1TENTH; 24 with 1.05 has @D % on these drives, @G % or more and 88.8 % or more. Without
+the F1TENTH any `OVERCONFIDENCE` does as well (8 with 1.175: 86.4 % on the F1TENTH). Without the halves' `disagreement`, at 8, the
+drives allow 1.37, the F1TENTH needs 1.61."""
 
 
 TOLD = 1.2
