@@ -80,8 +80,8 @@ def fit_rear_axle(
 
     A log of a car that slides has two explanations: tyres that saturate at its largest forces, or a road that banks with them.
     The search starts at both, and the better result is returned. The sensors' `offsets`, measured while the car stood, replace
-    the prior's zeros. The covariance allows for the `disagreement` of the logs' halves, each of which is fitted, too; without
-    `halves` it does not, for a fit that gives no bands.
+    the prior's zeros. The noises of `ALIKE` are larger than the fitted ones. The covariance allows for the `disagreement` of the
+    logs' halves, each of which is fitted, too; without `halves` it does not, for a fit that gives no bands.
 
     If the search runs out of steps, a `JaxvehWarning` is given. **Raises** `InputError` for a log without any measured row at
     speed, `FilterError` if the likelihood is not finite.

@@ -109,8 +109,9 @@ def calibrate(
     `validation` of the result is the sideslip RMSE in degrees on the second halves by the reference's weight (rad), for fits
     on the first halves.
 
-    Each half of the recordings is fitted, too: where the halves contradict each other, the parameters' covariance is larger and
-    the bands of an estimate are wider (`rear_axle_fit.disagreement`).
+    The axle's noises, `force_noise` and `slip_noise`, are twice the fitted ones, because neighbouring rows are alike
+    (`rear_axle_fit.ALIKE`). Each half of the recordings is fitted, too: where the halves contradict each other, the parameters'
+    covariance is larger and the bands of an estimate are wider (`rear_axle_fit.disagreement`).
 
     An a_y that is late, judged by the fitted car and the yaw rate, is shifted, and the car fitted again (`alignment`).
 

@@ -2,9 +2,10 @@
 the name of what was given.
 
 The functions are all that modules list in `__all__`, but for tools of those who add to a room; what is right for an argument
-stands here by its name.
+stands here by its name. Values are made when a test asks, so that collecting tests takes no time.
 """
 
+import functools
 import inspect
 from types import SimpleNamespace
 
@@ -34,7 +35,6 @@ DRIVE = Recording(T, {
     "steer": 0.02 * np.sin(T), "v_x": 20.0 + 0 * T, "v_y": 0 * T, "yaw_rate": 0.1 * np.sin(T), "a_y": 2.0 * np.sin(T),
     "a_x": 0 * T, "x": T, "y": T, "yaw": T, "steering_wheel": 0.3 * np.sin(T), "drive_torque": 0 * T, "brake_torque": 0 * T,
 })  # fmt: skip
-MODEL = estimators.state_space(CAR, DEVICE)
 FILE = io.CarSpecification(
     mass=1500.0, yaw_inertia=2500.0, front_axle_to_cg=1.2, rear_axle_to_cg=1.4, front_cornering_stiffness=8e4,
     rear_cornering_stiffness=9e4, wheel_radius=0.3, steering_ratio=15.0,
@@ -42,18 +42,19 @@ FILE = io.CarSpecification(
 )  # fmt: skip
 SLIP = np.linspace(-0.2, 0.2, 40)
 RIG = io.RigTable(SLIP, 0 * SLIP, np.full(40, 4000.0), F_y=3000.0 * np.tanh(10 * SLIP))
-ANSWERS = estimators.sideslip.estimate(FILE, DRIVE, method="open_loop")
-ESTIMATE = filters.run(filters.Extended(), MODEL, DRIVE)
-CHOSEN = estimators.state_space(CAR, DEVICE, estimate=lambda car: (car.front.D,), prior=0.1)
-LEARNER = estimators.geometry.METHODS["learner"].make(FILE)
-LEARNED = estimators.geometry.numbers_learned(estimators.geometry.estimate(LEARNER, DRIVE))
 AXLE = SimpleNamespace(time=T, mean=SimpleNamespace(slip_angle_rear=T, F_yr=T))
 FORCE = lambda model: (model.system.vehicle.front.D,)
 
-NOUNS = {
-    "a vehicle": CAR, "a car's file": FILE, "a recording": DRIVE, "a filter": filters.Extended(), "a tyre": tyres.Linear(8e4),
-    "a model": MODEL, "devices": DEVICE, "answers": ANSWERS, "rig data": RIG,
-}  # fmt: skip
+
+@functools.cache
+def nouns():
+    """Each noun by its name: made when a test asks, not when tests are collected."""
+    return {
+        "a vehicle": CAR, "a car's file": FILE, "a recording": DRIVE, "a filter": filters.Extended(),
+        "a tyre": tyres.Linear(8e4), "a model": estimators.state_space(CAR, DEVICE), "devices": DEVICE,
+        "answers": estimators.sideslip.estimate(FILE, DRIVE, method="open_loop"), "rig data": RIG,
+    }  # fmt: skip
+
 
 OF_NOUNS = {
     "car", "cars", "recording", "recordings", "filter", "tyre", "law", "model", "source", "vehicle", "estimate", "estimates",
@@ -62,34 +63,49 @@ OF_NOUNS = {
 }  # fmt: skip
 """Names of arguments that are a noun."""
 
-RIGHT = {
-    "car": CAR, "cars": {"truth": CAR}, "recording": DRIVE, "recordings": DRIVE, "filter": filters.Extended(),
-    "tyre": tyres.Linear(8e4), "law": tyres.Linear(8e4), "model": MODEL, "source": FILE, "vehicle": CAR, "estimate": ESTIMATE,
-    "estimates": ESTIMATE, "spec": FILE, "specification": FILE, "rig": RIG, "schedule": DRIVE, "key": jax.random.key(0),
-    "manoeuvre": manoeuvres.step_steer(20.0, 0.02), "sensors": DEVICE, "where": FORCE, "std": {"steer": 0.1},
-    "prior": {"v_y": 0.1}, "path": "nothing.csv", "raster": "a_y", "time": T, "mean": T, "truth": T, "reference": T,
-    "slips": {"front": T, "rear": T}, "contact": tyres.Contact(0.0, load=4000.0), "u": {"v_x": 20.0}, "dt": 0.1,
-    "gain": np.zeros((3, 2)), "points": ((MODEL.prior.mean, {"v_x": 20.0}),), "poles": [-5.0, -6.0], "rate": {"front_D": 1.0},
-    "design": sweeps.Design(x=[1.0]), "run": lambda point, key: {"y": point.x}, "window": 0.3, "rows": MODEL.rows(DRIVE),
-    "found": ANSWERS, "learned": LEARNED, "method": LEARNER, "load": 4000.0, "name": "sideslip", "told": {},
-    "quantity": estimators.sideslip, "start": MODEL.prior.mean, "stiffness": 8e4, "bandwidth": 5.0, "residuals": T,
-    "duration": 1.0, "folder": "nothing",
-}  # fmt: skip
-"""A right value by the argument's name, of the arguments that are looked at before a noun."""
+
+@functools.cache
+def rights():
+    """A right value by the argument's name, of nouns and of the arguments that are looked at before one."""
+    model, answers = nouns()["a model"], nouns()["answers"]
+    estimate = filters.run(filters.Extended(), model, DRIVE)
+    learner = estimators.geometry.METHODS["learner"].make(FILE)
+    learned = estimators.geometry.numbers_learned(estimators.geometry.estimate(learner, DRIVE))
+    return {
+        "car": CAR, "cars": {"truth": CAR}, "recording": DRIVE, "recordings": DRIVE, "filter": filters.Extended(),
+        "tyre": tyres.Linear(8e4), "law": tyres.Linear(8e4), "model": model, "source": FILE, "vehicle": CAR, "estimate": estimate,
+        "estimates": estimate, "spec": FILE, "specification": FILE, "rig": RIG, "schedule": DRIVE, "key": jax.random.key(0),
+        "manoeuvre": manoeuvres.step_steer(20.0, 0.02), "sensors": DEVICE, "where": FORCE, "std": {"steer": 0.1},
+        "prior": {"v_y": 0.1}, "path": "nothing.csv", "raster": "a_y", "time": T, "mean": T, "truth": T, "reference": T,
+        "slips": {"front": T, "rear": T}, "contact": tyres.Contact(0.0, load=4000.0), "u": {"v_x": 20.0}, "dt": 0.1,
+        "gain": np.zeros((3, 2)), "points": ((model.prior.mean, {"v_x": 20.0}),), "poles": [-5.0, -6.0], "rate": {"front_D": 1.0},
+        "design": sweeps.Design(x=[1.0]), "run": lambda point, key: {"y": point.x}, "window": 0.3, "rows": model.rows(DRIVE),
+        "found": answers, "learned": learned, "method": learner, "load": 4000.0, "name": "sideslip", "told": {},
+        "quantity": estimators.sideslip, "start": model.prior.mean, "stiffness": 8e4, "bandwidth": 5.0, "residuals": T,
+        "duration": 1.0, "folder": "nothing",
+    }  # fmt: skip
+
 
 OF_FILES = {name for name in listed_modules() if name.startswith("estimators.") and "kit" not in name}
 """Modules whose `car` is a car's file."""
 
-OTHERWISE = {
-    "filters.smooth_parallel": {"filter": filters.Iterated(filters.Extended())},
-    "fitting.starting_tyre": {"model": "mf"}, "plots.fit": {"fit": {"a": 1.0}}, "sensors.named_devices": {"name": "esc"},
-    "io.with_road_steer": {"car": FILE}, "io.write_car": {"car": FILE}, "diagnostics.check_car": {"car": FILE},
-    "plots.rear_axle": {"estimate": AXLE}, "plots.rear_axle_points": {"estimate": AXLE},
-    "estimators.compare": {"methods": ("open_loop",), "car": FILE}, "estimators.observe": {"model": CHOSEN},
-    "estimators.open_loop_of_file": {"car": FILE}, "estimators.sideslip.score": {"found": ANSWERS},
-    "filters.interleave": {"turns": {"one": filters.Turn(filters.Extended(), MODEL, lambda told: told, lambda *told: told[2])}},
-}  # fmt: skip
-"""Right values of one function, where they differ from `RIGHT`."""
+
+@functools.cache
+def otherwise():
+    """Right values of one function, where they differ from `rights`."""
+    model = nouns()["a model"]
+    chosen = estimators.state_space(CAR, DEVICE, estimate=lambda car: (car.front.D,), prior=0.1)
+    turn = filters.Turn(filters.Extended(), model, lambda told: told, lambda *told: told[2])
+    return {
+        "filters.smooth_parallel": {"filter": filters.Iterated(filters.Extended())},
+        "fitting.starting_tyre": {"model": "mf"}, "plots.fit": {"fit": {"a": 1.0}}, "sensors.named_devices": {"name": "esc"},
+        "io.with_road_steer": {"car": FILE}, "io.write_car": {"car": FILE}, "diagnostics.check_car": {"car": FILE},
+        "plots.rear_axle": {"estimate": AXLE}, "plots.rear_axle_points": {"estimate": AXLE},
+        "estimators.compare": {"methods": ("open_loop",), "car": FILE}, "estimators.observe": {"model": chosen},
+        "estimators.open_loop_of_file": {"car": FILE}, "estimators.sideslip.score": {"found": nouns()["answers"]},
+        "filters.interleave": {"turns": {"one": turn}},
+    }  # fmt: skip
+
 
 SEVERAL = {
     ("diagnostics.check_log", "car"): ("a car's file",), ("estimators.learned.with_residual_tyres", "car"): ("a vehicle",),
@@ -101,7 +117,7 @@ SEVERAL = {
     ("plots.estimate", "estimates"): ("answers",), ("plots.estimate", "truth"): ("a recording",),
     ("plots.top_view", "car"): ("a car's file",),
 }  # fmt: skip
-"""What an argument takes beside what stands in `RIGHT`, by function and argument."""
+"""What an argument takes beside what stands in `rights`, by function and argument."""
 
 LATER = {
     ("diagnostics.delay_of_rows", "truth"): "a traced formula of arrays",
@@ -127,7 +143,7 @@ CASES = [case for case in ALL if (case.values[0], case.values[2]) not in LATER]
 
 def right(name, function):
     """The arguments by name with which a function works, as far as the first check."""
-    own = RIGHT | ({"car": FILE} if name.rpartition(".")[0] in OF_FILES else {}) | OTHERWISE.get(name, {})
+    own = rights() | ({"car": FILE} if name.rpartition(".")[0] in OF_FILES else {}) | otherwise().get(name, {})
     asked = [one.name for one in arguments_of(function) if one.default is one.empty]
     return {one: own.get(one) for one in asked}, own
 
@@ -136,7 +152,7 @@ def right(name, function):
 def test_a_noun_in_place_of_another_is_named(name, function, argument, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     given, own = right(name, function)
-    for noun, wrong in NOUNS.items():
+    for noun, wrong in nouns().items():
         if type(wrong) is type(own.get(argument)) or noun in SEVERAL.get((name, argument), ()):
             continue
         with pytest.raises(jaxveh.InputError) as told:
@@ -148,4 +164,4 @@ def test_a_noun_in_place_of_another_is_named(name, function, argument, tmp_path,
 
 def test_what_is_left_out_is_there():
     there = {(case.values[0], case.values[2]) for case in ALL}
-    assert {*LATER, *SEVERAL} <= there and set(OTHERWISE) <= {name for name, _ in there}
+    assert {*LATER, *SEVERAL} <= there and set(otherwise()) <= {name for name, _ in there}

@@ -1,6 +1,7 @@
 """Speeds and times of small cars follow Froude's law; those of full-size cars are constants."""
 
 import dataclasses
+import functools
 
 import equinox as eqx
 import jax
@@ -24,8 +25,15 @@ def made(name, fidelity):
         return None  # the car lacks a number of the class
 
 
-ALL = {(name, fidelity): made(name, fidelity) for name in kit.CARS for fidelity in kit.FIDELITIES}
-CARS = {key: car for key, car in ALL.items() if isinstance(car, kit.AbstractTwoAxle)}
+FIDELITIES = sorted(name for name, kind in kit.FIDELITIES.items() if issubclass(kind, kit.AbstractTwoAxle))
+"""Those whose wheels slip."""
+
+
+@functools.cache
+def cars():
+    """Cars by name and fidelity: made when a test asks, not when tests are collected."""
+    every = {(name, fidelity): made(name, fidelity) for name in kit.CARS for fidelity in kit.FIDELITIES}
+    return {key: car for key, car in every.items() if isinstance(car, kit.AbstractTwoAxle)}
 
 
 def of_size(car, size):
@@ -35,13 +43,12 @@ def of_size(car, size):
 
 
 def test_every_car_and_fidelity_with_slips_is_here():
-    slipping = {name for name, kind in kit.FIDELITIES.items() if issubclass(kind, kit.AbstractTwoAxle)}
-    assert {fidelity for _, fidelity in CARS} == slipping and len(slipping) >= 9
+    assert {fidelity for _, fidelity in cars()} == {*FIDELITIES} and len(FIDELITIES) >= 9
 
 
-@pytest.mark.parametrize("fidelity", sorted({fidelity for _, fidelity in CARS}))
+@pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_slips_are_regularised_below_a_speed_that_scales_with_the_root_of_the_size(fidelity):
-    for (name, own), car in CARS.items():
+    for (name, own), car in cars().items():
         if own == fidelity:
             assert float(car.slip_floor) == 3.0, name
             for size in SIZES:
@@ -49,10 +56,10 @@ def test_slips_are_regularised_below_a_speed_that_scales_with_the_root_of_the_si
             assert dataclasses.replace(of_size(car, 0.1), crawl_speed=0.7).slip_floor == 0.7
 
 
-@pytest.mark.parametrize("fidelity", sorted({fidelity for _, fidelity in CARS}))
+@pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_rates_see_that_speed(fidelity):
     """A small car evaluated with its default is the one that is told the same crawl speed, and not the one of a full-size car."""
-    car = of_size(next(car for (_, own), car in CARS.items() if own == fidelity), 0.1)
+    car = of_size(next(car for (_, own), car in cars().items() if own == fidelity), 0.1)
     values = {"steer": 0.05, "v_x": 1.5}
     inputs = {name: values.get(name, 0.0) for name in car.inputs}
     u = record("Inputs", inputs)
@@ -90,7 +97,7 @@ def test_a_small_car_turns_as_the_closed_form_says():
 
 
 def test_a_batch_of_cars_has_a_floor_for_each_and_its_slope():
-    car = CARS["sedan", "linear"]
+    car = cars()["sedan", "linear"]
     at = lambda size: (
         of_size(car, 1.0).slip_floor
         if size is None
@@ -103,7 +110,7 @@ def test_a_batch_of_cars_has_a_floor_for_each_and_its_slope():
 
 def test_the_driver_of_a_small_car_is_as_quick_as_the_car():
     straight = manoeuvres.step_steer(10.0, 0.01)
-    for (name, fidelity), car in CARS.items():
+    for (name, fidelity), car in cars().items():
         if fidelity != "seven-dof":
             continue
         full = with_pedals(straight, car)
