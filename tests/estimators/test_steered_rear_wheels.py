@@ -112,13 +112,15 @@ def test_the_axles_of_stiffness_and_friction_carry_what_the_drive_feels():
     walking = QUANTITIES["stiffness"].METHODS["walking"].make(REAR).inner
     bank = QUANTITIES["friction"].METHODS["bank"].make(REAR).inner.inner
     flat = np.gradient(made["v_y"], made["time"]) + made["v_x"] * made["motion_yaw_rate"]
-    t, felt = jnp.asarray(0.0), {"walking": [], "bank": []}
+    t, felt = jnp.asarray(0.0), {"walking": [], "walking, next": [], "bank": []}
     rows = range(20, 300, 20)
     for k in rows:
         row = {name: jnp.asarray(made[name][k]) for name in ("v_x", "steer", "steer_rear", "a_y", "a_x", "yaw_rate")}
         v_y, yaw_rate = made["v_y"][k], made["motion_yaw_rate"][k]
         x = jnp.zeros(11).at[:2].set(jnp.stack([v_y, yaw_rate])).at[10].set(1.0)
-        felt["walking"].append(float(walking._forces(x, walking.followed.start(t, row))[2]))
+        first = walking.followed.start(t, row)
+        for name, signals in (("walking", first), ("walking, next", walking.followed.next(first, t + 0.01, row))):
+            felt[name].append(float(walking._forces(x, signals)[2]))
         told = start_told(t, row, bank.car.late)._replace(a_x=jnp.asarray(0.0))
         forces = bank._forces(jnp.zeros(8).at[:2].set(jnp.stack([v_y, yaw_rate])), 3.0, told)
         felt["bank"].append(float(sum(forces)) / PLAIN.mass)
