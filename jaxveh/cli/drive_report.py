@@ -14,7 +14,8 @@ from jaxveh.cli.manoeuvre import AskedManoeuvre, course_of, width_of
 from jaxveh.cli.output import make_folder
 from jaxveh.diagnostics import drive_channels
 from jaxveh.manoeuvres import clearance, understeer_of
-from jaxveh.vehicles import GRAVITY
+from jaxveh.vehicles import GRAVITY, linear_single_track
+from jaxveh.vehicles.kit import innermost_car
 
 BODY = 4.5
 """Assumed length of the car between the cones, m; its width is the one for which the course was made."""
@@ -25,6 +26,7 @@ SPEED = 80 / 3.6
 
 def wheelbase_of(car: Any) -> float | None:
     """Return the wheelbase, m; None for a car that has none."""
+    car = innermost_car(car)
     if not (hasattr(car, "front_axle_to_cg") and hasattr(car, "rear_axle_to_cg")):
         return None
     return float(car.front_axle_to_cg) + float(car.rear_axle_to_cg)
@@ -32,11 +34,10 @@ def wheelbase_of(car: Any) -> float | None:
 
 def steer_at_03g(car: Any) -> float | None:
     """Return the steer in a steady turn at 0.3 g and `SPEED` with linear tyres, rad; None for a car that has none."""
-    wheelbase, gradient = wheelbase_of(car), understeer_of(car)
-    if wheelbase is None or gradient is None:
+    if wheelbase_of(car) is None or understeer_of(car) is None:
         return None
-    steer = 0.3 * GRAVITY * (wheelbase / SPEED**2 + float(gradient))
-    return steer if steer > 0 else None
+    gain = float(linear_single_track(car).lateral_acceleration_gain(SPEED))
+    return 0.3 * GRAVITY / gain if gain > 0 else None
 
 
 def _reference_steer(asked: AskedManoeuvre, car: Any) -> float | None:

@@ -31,6 +31,7 @@ from jaxveh.vehicles import (
     linear,
     linear_single_track,
 )
+from jaxveh.vehicles import kit as vehicles
 
 
 def _derivatives(car: SingleTrack, t, x, u):
@@ -77,9 +78,7 @@ def _linear_car(car: Any) -> SingleTrack:
 
 def _steering_of(car: Any) -> AbstractSteering:
     """The steering of a car, which may be inside another (as `vehicles.linear_single_track` looks for it)."""
-    while isinstance(inner := getattr(car, "vehicle", None), AbstractVehicle):
-        car = inner
-    steering = getattr(car, "steering", FrontSteering())
+    steering = getattr(vehicles.innermost_car(car), "steering", FrontSteering())
     if steering.inputs not in (("steer",), RearSteering.inputs, IndependentSteering.inputs):
         raise InputError(
             f"open_loop: car.steering = {word_for(steering)}: needs {', '.join(steering.inputs)}; must be a steering whose "

@@ -39,8 +39,12 @@ USUAL: dict[str, UsualDrive] = {
 
 def options_of_car(name: str, car: Any) -> dict[str, float]:
     """The options of the manoeuvre `name` that follow from the car: mass and wheel radius for braking, wheelbase and
-    understeer gradient for a driver on a path. **Raises** `InputError` for an unknown name, and for what is no car."""
+    understeer gradient for a driver on a path. Of a car inside another (`AntiLock`, `Steered`, ...) they are the inner one's.
+
+    **Raises** `InputError` for an unknown name, and for what is no car.
+    """
     check_kind("car", car, vehicles.AbstractVehicle, "Such as vehicles.passenger_car().")
+    car = vehicles.kit.innermost_car(car)
     known = manoeuvre_options(name)
     found = {part: getattr(car, part, None) for part in ("mass", "wheel_radius")}
     if hasattr(car, "front_axle_to_cg") and hasattr(car, "rear_axle_to_cg"):
@@ -52,10 +56,12 @@ def options_of_car(name: str, car: Any) -> dict[str, float]:
 
 def understeer_of(car: Any) -> Any:
     """The understeer gradient of the car with its tyres' linear slopes, rad s^2/m; None for a car without tyres.
+    Of a car inside another it is the inner one's.
 
     **Raises** `InputError` for what is no car.
     """
     check_kind("car", car, vehicles.AbstractVehicle, "Such as vehicles.passenger_car().")
+    car = vehicles.kit.innermost_car(car)
     if isinstance(car, vehicles.LinearSingleTrack):
         return car.understeer_gradient
     return vehicles.linear_single_track(car).understeer_gradient if hasattr(car, "front") else None

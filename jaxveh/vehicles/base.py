@@ -166,3 +166,10 @@ def given_or_zero(state_type: Any, values: dict[str, Any], like: Any, parameter:
     check_names("start", values, state_type._fields)
     dtype, zero = jnp.result_type(parameter), jnp.zeros(jnp.shape(like))
     return state_type(*[jnp.asarray(values.get(name, zero), dtype) for name in state_type._fields])
+
+
+def innermost_car(car: Any) -> Any:
+    """The car itself, of one that is inside others (`AntiLock`, `Steered`, ...); of any other thing, that thing."""
+    while isinstance(inner := getattr(car, "vehicle", None), AbstractVehicle):
+        car = inner
+    return car

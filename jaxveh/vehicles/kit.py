@@ -1,7 +1,7 @@
 """The building blocks for new vehicles."""
 
 from jaxveh.vehicles.axles import AXLES
-from jaxveh.vehicles.base import with_batch_shape
+from jaxveh.vehicles.base import innermost_car, with_batch_shape
 from jaxveh.vehicles.drive import AbstractDriven
 from jaxveh.vehicles.fast_states import has_fast_states
 from jaxveh.vehicles.given_speed import AbstractToldSpeed
@@ -65,6 +65,7 @@ __all__ = [
     "corners",
     "each_wheel",
     "has_fast_states",
+    "innermost_car",
     "planar_loads",
     "rolling_wheels",
     "small_size",

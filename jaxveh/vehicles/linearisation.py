@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import check_has, check_kind
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
-from jaxveh.vehicles.base import GRAVITY, AbstractVehicle
+from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, innermost_car
 from jaxveh.vehicles.fourteen_dof import FourteenDOF
 from jaxveh.vehicles.linear_handling import LinearSingleTrack
 from jaxveh.vehicles.steering import FrontSteering
@@ -31,8 +31,7 @@ def linear_single_track(car: Any, *, cg_height: Any = None) -> LinearSingleTrack
 
     **Raises** `InputError` for a car without mass, yaw inertia, axle distances or tyres.
     """
-    while isinstance(inner := getattr(car, "vehicle", None), AbstractVehicle):
-        car = inner
+    car = innermost_car(car)
     if isinstance(car, LinearSingleTrack):
         return dataclasses.replace(car, cg_height=cg_height)
     check_kind(

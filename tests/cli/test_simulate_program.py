@@ -1,5 +1,6 @@
 """`jaxveh simulate`: vehicles, manoeuvres, roads, devices and events by name; numbers and figures; bad input in one line."""
 
+import dataclasses
 import json
 import math
 
@@ -107,9 +108,13 @@ def test_the_clearance_says_of_what_body_it_is(name, title):
 def test_the_sine_with_dwell_is_judged_by_the_cars_own_steer_at_03g(capsys):
     car = vehicle_of("passenger_car", "single-track")
     linear = vehicles.linear_single_track(car)
-    assert steer_at_03g(car) == pytest.approx(
-        0.3 * 9.80665 / float(linear.lateral_acceleration_gain(80 / 3.6)), rel=1e-6
-    )
+    straight = 0.3 * 9.80665 * float(linear.wheelbase / (80 / 3.6) ** 2 + linear.understeer_gradient)
+    assert steer_at_03g(car) == pytest.approx(straight, rel=1e-6)
+    # Rear wheels that turn with the front ones need more steer; those of a car inside another are its own.
+    alike = dataclasses.replace(car, steering=vehicles.FourWheelSteering(0.25))
+    assert steer_at_03g(alike) == pytest.approx(straight / 0.75, rel=1e-6)
+    assert steer_at_03g(vehicles.Steered(alike, 16.0)) == steer_at_03g(alike)
+    assert steer_at_03g(dataclasses.replace(car, steering=vehicles.FourWheelSteering(1.0))) is None
     assert steer_at_03g(vehicle_of("passenger_car", "longitudinal")) is None
     print_numbers({"sine with dwell": {"amplitude": 3.5, "stable": True, "responsive": None, "displacement": math.nan}})
     assert capsys.readouterr().out.strip().endswith("sine with dwell: amplitude 3.5, stable yes, responsive not judged")

@@ -30,16 +30,10 @@ STEERINGS = {
 }
 
 
-def innermost(car):
-    while hasattr(car, "vehicle"):
-        car = car.vehicle
-    return car
-
-
 ONE_EACH = {}
 for _name, _car in CARS.items():
     ONE_EACH.setdefault(type(_car.make()).__name__, _name)
-STEERED = {kind: name for kind, name in ONE_EACH.items() if hasattr(innermost(CARS[name].make()), "steering")}
+STEERED = {kind: name for kind, name in ONE_EACH.items() if hasattr(kit.innermost_car(CARS[name].make()), "steering")}
 """The first car of each class, by class, of those that take a steering."""
 
 UNSTEERED = {"Longitudinal": "goes straight"}
@@ -183,7 +177,7 @@ def test_gradients_of_steered_cars_equal_finite_differences(kind, steering):
     np.testing.assert_allclose(slope, expected, rtol=1e-5, atol=1e-7)
     found = sum(np.vdot(g, d) for g, d in zip(jax.tree.leaves(pull), jax.tree.leaves(along), strict=True))
     np.testing.assert_allclose(found, slope, rtol=1e-8, atol=1e-10)
-    steered = innermost(pull[0]).steering if kind not in ("Commanded", "KinematicCrawl", "Steered") else None
+    steered = kit.innermost_car(pull[0]).steering if kind not in ("Commanded", "KinematicCrawl", "Steered") else None
     assert all(float(jnp.abs(leaf)) > 0.0 for leaf in jax.tree.leaves(steered)) or kind in ON_ONE_TRACK
 
 
