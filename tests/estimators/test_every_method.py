@@ -1,6 +1,7 @@
 """Every method of every quantity keeps the contract of `estimators.method`: from what `estimators.__all__` lists."""
 
 import dataclasses
+import functools
 import inspect
 import pickle
 from types import ModuleType
@@ -47,6 +48,7 @@ def draws(method):
     return any(is_filter(node) and node.needs_key for node in jax.tree.leaves(method, is_leaf=is_filter))
 
 
+@functools.cache
 def made(quantity, name, car=method_logs.CAR):
     return QUANTITIES[quantity].METHODS[name].make(car)
 

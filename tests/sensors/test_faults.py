@@ -19,13 +19,16 @@ def heard(device, key=KEY, duration=2.0):
     return times, {name: np.asarray(value) for name, value in said.items()}
 
 
-TIMES, HEALTHY = heard(NOISY)
+@pytest.fixture(scope="module")
+def healthy():
+    """What it says without a fault."""
+    return heard(NOISY)[1]
 
 
 def changes(device, key=KEY, duration=2.0):
     """What a fault adds to each channel of the same drive with the same noise."""
-    _, healthy = heard(NOISY, key, duration)
-    return {name: value - healthy[name] for name, value in heard(device, key, duration)[1].items()}
+    _, sound = heard(NOISY, key, duration)
+    return {name: value - sound[name] for name, value in heard(device, key, duration)[1].items()}
 
 
 def test_a_step_begins_at_its_time_in_its_channel_alone():
@@ -34,17 +37,17 @@ def test_a_step_begins_at_its_time_in_its_channel_alone():
     assert not found["a_x"].any() and not found["yaw_rate"].any()
 
 
-def test_a_stuck_channel_says_its_last_value():
+def test_a_stuck_channel_says_its_last_value(healthy):
     said = heard(Stuck(NOISY, ("a_x", "yaw_rate"), 0.5, 0.8))[1]
     for name in ("a_x", "yaw_rate"):
-        np.testing.assert_array_equal(said[name][50:80], HEALTHY[name][49])
-        np.testing.assert_array_equal(np.delete(said[name], slice(50, 80)), np.delete(HEALTHY[name], slice(50, 80)))
-    np.testing.assert_array_equal(said["a_y"], HEALTHY["a_y"])
+        np.testing.assert_array_equal(said[name][50:80], healthy[name][49])
+        np.testing.assert_array_equal(np.delete(said[name], slice(50, 80)), np.delete(healthy[name], slice(50, 80)))
+    np.testing.assert_array_equal(said["a_y"], healthy["a_y"])
 
 
-def test_a_channel_that_is_stuck_from_the_start_says_its_first_value():
+def test_a_channel_that_is_stuck_from_the_start_says_its_first_value(healthy):
     said = heard(Stuck(NOISY, "a_x", 0.0))[1]
-    np.testing.assert_array_equal(said["a_x"], HEALTHY["a_x"][0])
+    np.testing.assert_array_equal(said["a_x"], healthy["a_x"][0])
 
 
 def test_spikes_come_as_often_and_as_large_as_they_should():
@@ -72,12 +75,12 @@ def test_faults_around_faults_draw_numbers_of_their_own():
     assert {int(value) for value in np.unique(np.round(found))} == kinds
 
 
-def test_dropouts_are_silent_in_their_spans():
+def test_dropouts_are_silent_in_their_spans(healthy):
     said = heard(Dropout(NOISY, "a_x", spans=((0.5, 0.6), (1.9, np.inf))))[1]
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(said["a_x"])), [*range(50, 60), *range(190, 201)])
     kept = np.isfinite(said["a_x"])
-    np.testing.assert_array_equal(said["a_x"][kept], HEALTHY["a_x"][kept])
-    np.testing.assert_array_equal(said["a_y"], HEALTHY["a_y"])
+    np.testing.assert_array_equal(said["a_x"][kept], healthy["a_x"][kept])
+    np.testing.assert_array_equal(said["a_y"], healthy["a_y"])
 
 
 def test_a_lost_message_takes_all_its_channels():
@@ -94,19 +97,19 @@ def test_without_a_key_random_faults_do_not_come():
         np.testing.assert_array_equal(heard(device, None)[1]["a_x"], quiet["a_x"])
 
 
-def test_onsets_and_sizes_may_be_batched_and_differentiated():
+def test_onsets_and_sizes_may_be_batched_and_differentiated(healthy):
     times, outputs = NOISY.sample_times(2.0), truth(NOISY.look_times(2.0))
     one = lambda at, size: BiasStep(NOISY, "a_y", at, size).read(times, outputs, KEY)["a_y"]
     batch = np.asarray(jax.jit(jax.vmap(one))(np.array([0.3, 1.5]), np.array([0.5, -2.0])))
-    np.testing.assert_allclose(batch[1] - HEALTHY["a_y"], np.where(np.arange(201) >= 150, -2.0, 0.0), atol=1e-12)
+    np.testing.assert_allclose(batch[1] - healthy["a_y"], np.where(np.arange(201) >= 150, -2.0, 0.0), atol=1e-12)
     slope = jax.jit(jax.grad(lambda size: jnp.sum(one(jnp.asarray(0.3), size))))(0.5)
     np.testing.assert_allclose(slope, 171.0, rtol=1e-12)
 
 
-def test_a_renamed_device_says_the_same_under_other_names():
+def test_a_renamed_device_says_the_same_under_other_names(healthy):
     device = Renamed(NOISY, {"a_x": "second_a_x"})
     assert device.channels == ("second_a_x", "a_y", "yaw_rate") and device.units["second_a_x"] == "m/s^2"
-    np.testing.assert_array_equal(heard(device)[1]["second_a_x"], HEALTHY["a_x"])
+    np.testing.assert_array_equal(heard(device)[1]["second_a_x"], healthy["a_x"])
 
 
 @pytest.mark.parametrize(
