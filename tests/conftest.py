@@ -10,8 +10,10 @@ import shutil
 from importlib.metadata import version
 from pathlib import Path
 
+import hypothesis
 import jax
 import pytest
+from hypothesis import strategies
 from time_budget import keep_fifth, keep_one_colour, keep_to_budget, record_seconds
 
 jax.config.update("jax_enable_x64", True)
@@ -69,9 +71,14 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
-    """What has been imported and collected stays: looking through it for cycles takes seconds each time."""
+    """What has been imported and collected stays: looking through it for cycles takes seconds each time.
+
+    Hypothesis goes through all objects that do not stay, when it runs for the first time: now there are none, later it takes up
+    to ten seconds.
+    """
     gc.collect()
     gc.freeze()
+    hypothesis.settings(max_examples=1, database=None)(hypothesis.given(strategies.none())(lambda nothing: None))()
 
 
 @pytest.hookimpl(optionalhook=True)
