@@ -5,15 +5,15 @@ longer than `BUDGET`. Beyond it a function's time grows with the square root of 
 runs, the others are left to `-m full`. Each function starts at a case of its own, which its name decides: most members of a
 class (every filter, every method) meet some test, and a file alone runs the cases that it runs among all. Cases that take
 longer than `LONGEST` are `thorough`, the quickest functions of a file first, for `LONG_BUDGET` seconds a file; the others are
-left to `-m full` too. A case that alone takes much longer than its function's others is on record by its own name: it is long,
+`seldom`. A case that alone takes much longer than its function's others is on record by its own name: it is long,
 the others are not. A function that is not on record runs whole, so that a new one is never left out, and so does one that is
 marked `whole`: each of its cases is the only one that looks at a member's numbers.
 
 `JAXVEH_SECONDS=1 python -m pytest` records them again.
 
-`JAXVEH_FIFTH=0` to `4` leaves four fifths of what is `thorough` or of the `studies` to `-m full`. `.ci/run` takes the fifth that
-the commit decides, so that changes in a row run all of them, and the same commit always the same: all of them at once would take
-it 30 minutes. Without it all run.
+`JAXVEH_PART=0` to `19` leaves four fifths of what is `thorough` or of the `studies`, and 19 twentieths of what is `seldom`, to
+`-m full`. `.ci/run` takes the part that the commit decides, so that changes in a row run all of them, and the same commit always
+the same: all of them at once would take it two hours. Without it all run.
 """
 
 import json
@@ -40,7 +40,10 @@ RECORD = Path(__file__).parent / "recorded" / "seconds.json"
 ALWAYS = ("site/test_notebooks.py", "test_a_page_runs_from_top_to_bottom[README.md]", "[jaxveh estimate drive.csv")
 """Parts of the names of those of every fifth: what a user meets first."""
 
-LEFT_OUT = ("full", "thorough", "peers", "studies", "site")
+PARTS = {"thorough": 5, "studies": 5, "seldom": 20}
+"""Of what bears the mark `.ci/run` runs one in so many."""
+
+LEFT_OUT = ("full", "peers", "site", *PARTS)
 """Marks of tests that do not run by default whatever they take. What no other test executes is marked `thorough` by hand,
 whatever it takes."""
 
@@ -73,7 +76,8 @@ def keep_one_colour(items):
 
 
 def keep_to_budget(items):
-    """Mark as `full` the cases beyond a function's budget, and as `thorough` what is left of those that take too long."""
+    """Mark as `full` the cases beyond a function's budget, and as `thorough` or `seldom` what is left of those that take too
+    long."""
     seconds, cases, long = json.loads(RECORD.read_text()), {}, {}
     for item in items:
         if any(item.get_closest_marker(mark) for mark in (*LEFT_OUT, "whole")):
@@ -101,16 +105,17 @@ def mark_long(functions):
     for took, _, members in sorted(functions, key=lambda function: function[:2]):
         spent += took
         for item in members:
-            item.add_marker(pytest.mark.thorough if spent <= LONG_BUDGET else pytest.mark.full)
+            item.add_marker(pytest.mark.thorough if spent <= LONG_BUDGET else pytest.mark.seldom)
 
 
-def keep_fifth(items, fifth):
-    """Mark as `full` those long tests that are not of this fifth, 0 to 4: of pages each by itself, of other files each function
-    with all its cases, which share what they compile. Whatever stands beside a test, it is of the same fifth."""
+def keep_part(items, part):
+    """Mark as `full` those long tests that are not of this part, 0 to 19: of pages each by itself, of other files each function
+    with all its cases, which share what they compile. Whatever stands beside a test, it is of the same part."""
     for item in items:
-        long = item.get_closest_marker("thorough") or item.get_closest_marker("studies")
-        name = item.nodeid if "/site/" in item.nodeid else function_of(item.nodeid)
-        if long and not any(part in item.nodeid for part in ALWAYS) and zlib.crc32(name.encode()) % 5 != fifth:
+        if any(name in item.nodeid for name in ALWAYS):
+            continue
+        own = zlib.crc32((item.nodeid if "/site/" in item.nodeid else function_of(item.nodeid)).encode())
+        if any(item.get_closest_marker(mark) and own % count != part % count for mark, count in PARTS.items()):
             item.add_marker(pytest.mark.full)
 
 

@@ -42,7 +42,7 @@ COPIED = (
     "noxfile.py",
 )
 EXIT_NO_TESTS = 5
-WITH_LONG_CASES = ("-m", "not full and not peers and not studies and not site")
+WITH_LONG_CASES = ("-m", "not full and not seldom and not peers and not studies and not site")
 
 SLOWER = 4.0
 """A mutation counts as noticed if a test file takes this many times its usual time."""

@@ -46,26 +46,33 @@ class Item:
 
 
 class Long(Item):
-    """One that is marked as long."""
+    """One that is marked as long, by one of the marks."""
+
+    def __init__(self, nodeid, mark):
+        super().__init__(nodeid)
+        self.mark = mark
 
     def get_closest_marker(self, name):
-        return name in ("thorough", "studies") or None
+        return name == self.mark or None
 
 
-def test_five_fifths_are_all_long_tests_and_share_only_what_a_user_meets_first():
+@pytest.mark.parametrize(("mark", "count"), time_budget.PARTS.items())
+def test_all_parts_are_all_long_tests_and_share_only_what_a_user_meets_first(mark, count):
     names = [f"tests/a.py::f{k}[{case}]" for k in range(60) for case in range(3)]
     names += [f"tests/site/test_pages_run.py::page[{k}.md]" for k in range(60)]
     first = "tests/site/test_pages_run.py::test_a_page_runs_from_top_to_bottom[README.md]"
-    fifths = []
-    for fifth in range(5):
-        items = [Long(name) for name in (*names, first)] + [Item("tests/a.py::quick")]
-        time_budget.keep_fifth(items, fifth)
+    parts = []
+    for part in range(20):
+        items = [Long(name, mark) for name in (*names, first)] + [Item("tests/a.py::quick")]
+        time_budget.keep_part(items, part)
         assert items[-1].marks == items[-2].marks == []
-        fifths.append({item.nodeid for item in items[:-2] if not item.marks})
-    assert set().union(*fifths) == set(names) and sum(map(len, fifths)) == len(names)
-    assert all(30 < len(fifth) < 70 for fifth in fifths)
-    # All cases of a function are of one fifth.
-    functions = [{function_of(name) for name in fifth if "/site/" not in name} for fifth in fifths]
+        parts.append({item.nodeid for item in items[:-2] if not item.marks})
+    assert parts == parts[:count] * (20 // count)
+    parts = parts[:count]
+    assert set().union(*parts) == set(names) and sum(map(len, parts)) == len(names)
+    assert max(map(len, parts)) < 4 * len(names) / count
+    # All cases of a function are of one part.
+    functions = [{function_of(name) for name in part if "/site/" not in name} for part in parts]
     assert sum(map(len, functions)) == 60
 
 
@@ -152,7 +159,7 @@ def test_of_a_files_long_cases_the_quickest_run():
     cases = {name: Item(name) for name in takes}
     time_budget.mark_long([(took, name, [cases[name]]) for name, took in takes.items()])
     marks = {name: item.marks for name, item in cases.items()}
-    assert marks == {"a": ["thorough"], "c": ["thorough"], "b": ["full"], "d": ["full"]}
+    assert marks == {"a": ["thorough"], "c": ["thorough"], "b": ["seldom"], "d": ["seldom"]}
 
 
 @pytest.mark.parametrize("each", [0.01, 0.06, 0.3, 2.0])
@@ -186,7 +193,7 @@ def test_a_case_that_takes_long_alone_is_on_record_alone(tmp_path, monkeypatch):
     items = {name: Item(f"tests/a.py::{name}") for name in ("f[1]", "f[2]", "f[slow]", "g[1]", "g[slow]")}
     time_budget.keep_to_budget(list(items.values()))
     assert {name: item.marks for name, item in items.items()} == {
-        "f[1]": [], "f[2]": [], "f[slow]": ["thorough"], "g[1]": [], "g[slow]": ["full"]
+        "f[1]": [], "f[2]": [], "f[slow]": ["thorough"], "g[1]": [], "g[slow]": ["seldom"]
     }  # fmt: skip
     record_seconds({"tests/a.py::f[slow]": 0.1})
     assert "a.py::f[slow]" not in json.loads(time_budget.RECORD.read_text())
