@@ -14,8 +14,7 @@ from jaxveh.cli.manoeuvre import AskedManoeuvre, course_of, width_of
 from jaxveh.cli.output import make_folder
 from jaxveh.diagnostics import drive_channels
 from jaxveh.manoeuvres import clearance, understeer_of
-from jaxveh.vehicles import GRAVITY, linear_single_track
-from jaxveh.vehicles.kit import innermost_car
+from jaxveh.vehicles import GRAVITY, kit, linear_single_track
 
 BODY = 4.5
 """Assumed length of the car between the cones, m; its width is the one for which the course was made."""
@@ -26,7 +25,7 @@ SPEED = 80 / 3.6
 
 def wheelbase_of(car: Any) -> float | None:
     """Return the wheelbase, m; None for a car that has none."""
-    car = innermost_car(car)
+    car = kit.innermost_car(car)
     if not (hasattr(car, "front_axle_to_cg") and hasattr(car, "rear_axle_to_cg")):
         return None
     return float(car.front_axle_to_cg) + float(car.rear_axle_to_cg)
