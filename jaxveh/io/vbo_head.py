@@ -11,7 +11,7 @@ from jaxveh._core.errors import InputError, warn
 from jaxveh.io.units import is_unit_name
 
 ALIASES = {
-    "satellites": "sats", "latitude": "lat", "longitude": "long", "lon": "long", "altitude": "height",
+    "satellites": "sats", "latitude": "lat", "longitude": "long", "lon": "long", "lng": "long", "altitude": "height",
     "vertvel": "vertical_velocity", "vert_vel": "vertical_velocity", "verticalvelocity": "vertical_velocity",
 }  # fmt: skip
 """Other names of the standard columns, in small letters and with `_` for `-`."""

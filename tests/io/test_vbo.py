@@ -52,7 +52,7 @@ def text_of(draw, drive):
     more = draw.sample(list(MORE), draw.randrange(len(MORE) + 1))
     capital = draw.choice([str, str.upper])
     long_name, rate_name = (
-        draw.choice(["long", "lon", "longitude"]),
+        draw.choice(["long", "lon", "longitude", "lng"]),
         draw.choice(["vertvel", "vert-vel", "vertical_velocity"]),
     )
     clock = np.round(drive["t"] % 86_400.0, 3)
