@@ -12,7 +12,7 @@ from jaxveh._core.errors import LARGEST_SEED
 from jaxveh.diagnostics import kit
 
 LOG_HELP = (
-    "The log: .csv (.txt, .tsv, .dat), .parquet, .nc, .mf4, .mdf, .mat, .mcap or .vbo, with a time column and channels "
+    "The log: .csv (.txt, .tsv, .dat, .log), .parquet, .nc, .mf4, .mdf, .mat, .mcap or .vbo, with a time column and channels "
     "(jaxveh schema channels)."
 )
 

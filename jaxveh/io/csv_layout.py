@@ -13,6 +13,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.io.channel_map import ChannelMap
 from jaxveh.io.decimals import is_number
 from jaxveh.io.naming import split_unit
+from jaxveh.io.race_capture import CLOCK, named_by_race_capture
 from jaxveh.io.stamps import is_stamp
 from jaxveh.io.units import is_unit, is_unit_name, without_brackets
 
@@ -36,7 +37,7 @@ class Layout(NamedTuple):
     """The parts of a text table.
 
     `headings`: the names; `units`: by heading, empty without a line of units; `first`: the number of lines above the rows;
-    `remarks`: what was assumed, in words.
+    `remarks`: what was assumed, in words; `clock`: the heading of the time, "" where the format does not tell.
     """
 
     headings: list[str]
@@ -46,6 +47,7 @@ class Layout(NamedTuple):
     decimal: str
     encoding: str
     remarks: tuple[str, ...]
+    clock: str = ""
 
 
 def find_layout(path: Path, told: ChannelMap | None) -> Layout:
@@ -79,6 +81,8 @@ def _layout(
     separator = BLANKS if separator == " " else separator
     names, units, first, separator = _places(path, lines, separator, told.names_line if told else None)
     headings = _names(lines[names], separator, path, names)
+    capture = named_by_race_capture(headings)
+    headings = capture[0] if capture else headings
     remarks = list(assumed)
     above = [line for line in lines[:names] if line.strip() and not line.startswith(COMMENT)]
     if len(above) > (said is not None) and not (told and told.names_line):
@@ -87,9 +91,11 @@ def _layout(
     if below and not (told and told.names_line):
         remarks.append(f"between the names and the rows, line {', '.join(map(str, below))} is not read")
     told_units = [] if units is None else [without_brackets(one) for one in _split(lines[units], separator)]
+    told_units = capture[1] if capture else told_units
+    clock = CLOCK if capture and headings.count(CLOCK) == 1 else ""
     by_name = dict(zip([*headings, *with_numbers(headings)], [*told_units, *told_units], strict=False))
     decimal = (told.decimal if told else None) or _decimal(lines[first:], separator)
-    return Layout(headings, by_name, first, separator, decimal, encoding, tuple(remarks))
+    return Layout(headings, by_name, first, separator, decimal, encoding, tuple(remarks), clock)
 
 
 def with_numbers(headings: Sequence[str]) -> list[str]:

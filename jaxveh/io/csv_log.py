@@ -34,18 +34,21 @@ def open_csv(path: Path, channels: ChannelMap | None) -> TableLog:
         return open_haltech(path, channels)
     table = read_columns(path, channels)
     more = [one for one in with_numbers(table.headings) if one not in table.headings]
-    log = TableLog(path, [*table.headings, *more], table.cells.__getitem__, table.units, "", channels, table.point)
+    headings = [*table.headings, *more]
+    log = TableLog(path, headings, table.cells.__getitem__, table.units, "", channels, table.point, table.clock)
     log.names = tuple(name for name in log.names if name not in {split_unit(one)[0] for one in more})
     return log
 
 
 class TextTable(NamedTuple):
-    """The columns of a text file: `headings`, `cells` by heading, `units` of a line of units by heading, the decimal `point`."""
+    """The columns of a text file: `headings`, `cells` by heading, `units` of a line of units by heading, the decimal `point`, and
+    `clock`, the heading of the time or "" where the format does not tell."""
 
     headings: list[str]
     cells: dict[str, Any]
     units: dict[str, str]
     point: str
+    clock: str = ""
 
 
 def read_columns(path: Path, told: ChannelMap | None = None) -> TextTable:
@@ -62,7 +65,7 @@ def read_columns(path: Path, told: ChannelMap | None = None) -> TextTable:
     headings = _named(layout.headings, frame)
     _tell_short_rows(path, layout, headings, frame, "strict")
     cells = _cells(with_numbers(headings), frame) | _cells(headings, frame)
-    return TextTable(headings, cells, layout.units, layout.decimal)
+    return TextTable(headings, cells, layout.units, layout.decimal, layout.clock)
 
 
 def _without_comments(path: Path, layout: Layout, frame: Any) -> tuple[Any, Sequence[str]]:
@@ -71,7 +74,9 @@ def _without_comments(path: Path, layout: Layout, frame: Any) -> tuple[Any, Sequ
     if first.dtype.kind in "fiub":
         return frame, ()
     texts = first.astype(str).str.strip()
-    if (again := np.flatnonzero(texts == layout.headings[0])).size:
+    # The names of a RaceCapture go on with units.
+    repeated = (texts == layout.headings[0]) | texts.str.startswith(f"{layout.headings[0]}|")
+    if (again := np.flatnonzero(repeated)).size:
         raise InputError(
             f"{path}: data row {again[0] + 1} holds the names of the columns again: several drives in one file? Split it there."
         )

@@ -11,7 +11,7 @@ from jaxveh.io.channel_map import Channel, ChannelMap
 from jaxveh.io.log import Column, Log
 from jaxveh.io.naming import check_known
 
-TEXTS = (".txt", ".dat")
+TEXTS = (".txt", ".dat", ".log")
 """Suffixes that are also those of notes: read only where there are no others."""
 
 Opener = Callable[[Path, ChannelMap | None], Log]

@@ -64,8 +64,8 @@ class TableLog(Log):
     """A log whose columns share one time column, or have one of their own: CSV and Parquet.
 
     `headings` are the names of the columns, `load` returns the cells of one; a name may have its unit in brackets
-    (`yaw_rate [deg/s]`), unless `units` has it. `point` is the decimal sign of texts. A name that several columns have can be
-    neither a known channel nor be loaded.
+    (`yaw_rate [deg/s]`), unless `units` has it. `point` is the decimal sign of texts, `clock` the time column of a format that
+    has always the same. A name that several columns have can be neither a known channel nor be loaded.
     """
 
     def __init__(
@@ -77,6 +77,7 @@ class TableLog(Log):
         note: str,
         channels: ChannelMap | None,
         point: str = ".",
+        clock: str = "",
     ):
         self.path, self.note, self._load, self._point = path, note, load, point
         self._twice = {heading for heading in headings if headings.count(heading) > 1}
@@ -91,7 +92,7 @@ class TableLog(Log):
         plain = {heading: (heading if name in alike else name, unit) for heading, (name, unit) in plain.items()}
         self._heading = {name: heading for heading, (name, _) in plain.items()}
         self._units = dict(plain.values())
-        time = channels.time if channels else None
+        time = (channels.time if channels else None) or (Channel(clock) if clock else None)
         time_name = self._find_time(time) if channels is None or channels.shares_time else None
         part = None if time_name is None else nanoseconds_of(time_name, self._heading)
         self.names = tuple(name for name in self._heading if name not in (time_name, part))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -37,6 +38,19 @@ def open_dat(path: Path, channels: ChannelMap | None) -> Log:
     return open_mdf(path, channels) if is_mdf else open_csv(path, channels)
 
 
+_BUS_FRAME = re.compile(rb"\s*\(\d+\.\d+\)\s+\w+\s+[0-9A-Fa-f]+(#|\s+\[\d+\])")
+"""A line of can-utils: `(1631416514.717133) can0 0D2#0000FFFF`."""
+
+
+def open_text_log(path: Path, channels: ChannelMap | None) -> Log:
+    """Open a `.log` file, which is a table of text (RaceCapture) or a trace of a CAN bus, which is not read."""
+    with path.open("rb") as file:
+        frames = _BUS_FRAME.match(file.read(200)) is not None
+    if frames:
+        raise InputError(f"{path}: holds the frames of a CAN bus: {_DECODE}.")
+    return open_csv(path, channels)
+
+
 _OPEN: dict[str, Callable[[Path, ChannelMap | None], Log]] = {
     ".csv": open_csv,
     ".parquet": open_parquet,
@@ -49,6 +63,7 @@ _OPEN: dict[str, Callable[[Path, ChannelMap | None], Log]] = {
     ".txt": open_csv,
     ".tsv": open_csv,
     ".dat": open_dat,
+    ".log": open_text_log,
 }
 _WRITE = {
     ".csv": write_csv,
@@ -57,18 +72,18 @@ _WRITE = {
     ".mdf": write_mdf,
     ".nc": write_recording_netcdf,
 }
+_DECODE = "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)"
 _ELSEWHERE = {
     ".xlsx": "save the sheet as CSV",
     ".xls": "save the sheet as CSV",
     ".ld": "export it as CSV from MoTeC i2",
     ".xrk": "export it as CSV from AiM's Race Studio",
-    ".blf": "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)",
-    ".asc": "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)",
-    ".trc": "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)",
+    ".blf": _DECODE,
+    ".asc": _DECODE,
+    ".trc": _DECODE,
     ".bag": "convert it to MCAP (`mcap convert`)",
     ".db3": "convert it to MCAP (`mcap convert`)",
-    ".log": "a table of text may end in .txt; CAN frames are decoded with their DBC file into MDF4 (asammdf)",
-    ".can": "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)",
+    ".can": _DECODE,
     ".ibt": "export it as CSV, with its units",
     ".erg": "export it as CSV or MATLAB from CarMaker's IPGControl",
     ".vs": "export it as CSV or MATLAB from CarSim's plotter",
@@ -104,9 +119,9 @@ def read_recording(
     raster: str | None = None,
     method: str = "linear",
 ) -> Recording:
-    """Read a log: text (`.csv`, `.txt`, `.tsv`, `.dat`), `.parquet`, `.mf4` or `.mdf` (also as `.dat`), MATLAB's `.mat` (structs
-    included), `.mcap` (topics of JSON messages), NetCDF 4 (`.nc`), a VBOX's `.vbo`, or a folder with a file for each message or
-    device.
+    """Read a log: text (`.csv`, `.txt`, `.tsv`, `.dat`, `.log`), `.parquet`, `.mf4` or `.mdf` (also as `.dat`), MATLAB's `.mat`
+    (structs included), `.mcap` (topics of JSON messages), NetCDF 4 (`.nc`), a VBOX's `.vbo`, or a folder with a file for each
+    message or device.
 
     **Arguments**: `channels`: a channel map or the path of one (see `io.channel_map.CHANNEL_MAP_SCHEMA`); without it every column
     is a channel with its own name, and time is the column `time`, `timestamps`, `timestamp` or `t`, or two with seconds and
@@ -126,7 +141,7 @@ def read_recording(
     they are NaN in rows without a satellite.
 
     **Text** may have lines above the names of the columns, a line of units below them, `,`, `;`, tabs, `|` or blanks between
-    cells, and decimal commas; it may be an export of Haltech's NSP. What was assumed (lines above that are not read, an
+    cells, and decimal commas; it may be an export of Haltech's NSP, or of a RaceCapture. What was assumed (lines above that are not read, an
     encoding) is told in a `JaxvehWarning`.
 
     **Raises** `InputError` naming file, column, row, value and remedy: a missing file, an unknown suffix, a broken file, an

@@ -74,7 +74,7 @@ WAYS = {
 
 
 def test_every_suffix_is_here():
-    texts = {".txt", ".tsv", ".dat", ".vbo"}  # not written: see test_loggers and test_vbo
+    texts = {".txt", ".tsv", ".dat", ".log", ".vbo"}  # not written: see test_loggers and test_vbo
     assert {way for way in WAYS if way.startswith(".")} | texts == set(io.LOG_SUFFIXES)
     assert set(io.SUFFIXES) | {".mat", ".mcap"} | texts == set(io.LOG_SUFFIXES)
 
@@ -120,7 +120,7 @@ def test_a_suffix_that_is_not_read_is_told_with_those_that_are(tmp_path):
         for read in (io.read_recording, Recording.load):
             with pytest.raises(
                 InputError,
-                match=r"must end in one of \.csv, \.parquet, \.mf4, \.mdf, \.mat, \.mcap, \.nc, \.vbo, \.txt, \.tsv, \.dat\.",
+                match=r"must end in one of \.csv, \.parquet, \.mf4, \.mdf, \.mat, \.mcap, \.nc, \.vbo, \.txt, \.tsv, \.dat, \.log\.",
             ) as told:
                 read(path)
         assert ("Did you mean .mcap?" in str(told.value)) == (suffix == ".MCPA")

@@ -65,7 +65,7 @@ def log_of(seed):
 def test_every_form_is_the_same_log(tmp_path, block):
     for seed in range(40 * block, 40 * block + 40):
         data, told, foreign = log_of(seed)
-        path = tmp_path / f"log{random.Random(seed).choice(['.csv', '.txt', '.tsv', '.dat', '.CSV'])}"
+        path = tmp_path / f"log{random.Random(seed).choice(['.csv', '.txt', '.tsv', '.dat', '.CSV', '.log'])}"
         path.write_bytes(data)
         with warnings.catch_warnings(record=True) as heard:
             warnings.simplefilter("always")
