@@ -137,6 +137,14 @@ def _inside(size: int, edge: int) -> np.ndarray:
     return inside
 
 
+def without_jumps(angles: np.ndarray) -> np.ndarray:
+    """Return angles (n,), in radians or degrees, without the jumps of a full turn if they are wrapped."""
+    # A wrapped angle stays within a turn: of radians if it fits into one.
+    turn = 2.0 * np.pi if np.ptp(angles) < 6.3 else 360.0
+    jumps = np.max(np.abs(np.diff(angles)), initial=0.0) > 0.5 * turn
+    return np.unwrap(angles, period=turn) if jumps and np.ptp(angles) <= 1.01 * turn else angles
+
+
 AGREE = 0.5
 """Correlation above which two channels count as related."""
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import AGREE, SCALED, LogFinding, LogView, fit, is_one, shown_time
+from jaxveh.diagnostics.log_findings import AGREE, SCALED, LogFinding, LogView, fit, is_one, shown_time, without_jumps
 
 RATES = {
     "yaw": "yaw_rate",
@@ -110,13 +110,9 @@ def _compare(log: LogView, name: str, rate: str) -> list[LogFinding]:
 
 def _unwrapped(log: LogView, name: str) -> np.ndarray:
     """The channel on the grid without the jumps of a full turn, in radians or degrees, of an angle that is wrapped."""
-    values = log.channels[name]
-    known = np.isfinite(values)
-    # A wrapped angle stays within a turn: of radians if it fits into one.
-    turn = 2.0 * np.pi if np.ptp(values[known]) < 6.3 else 360.0
-    jumps = np.max(np.abs(np.diff(values[known])), initial=0.0) > 0.5 * turn
-    if name == "z" or not jumps or np.ptp(values[known]) > 1.01 * turn:
+    if name == "z":
         return log.even(name)
-    whole = values.copy()
-    whole[known] = np.unwrap(values[known], period=turn)
+    whole = log.channels[name].copy()
+    known = np.isfinite(whole)
+    whole[known] = without_jumps(whole[known])
     return replace(log, channels={**log.channels, name: whole}).even(name)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import LogFinding, LogView, shown_time
+from jaxveh.diagnostics.log_findings import LogFinding, LogView, shown_time, without_jumps
+from jaxveh.io import kit
 
 HELD = 0.1
 """Share of samples equal to the previous one above which a channel is reported to repeat."""
@@ -17,6 +20,10 @@ NEVER_STILL = ("v_x", "v_y", "a_x", "a_y", "yaw_rate", "roll_rate", "sideslip")
 
 JUMPY = ("throttle", "brake", "wheel_speed", "drive_torque", "gear")
 """Beginnings of the names of channels that may jump although nothing is wrong."""
+
+DIRECTION = r"\b(yaw|heading|course|bearing|azimuth|psi|hdg|cog)\b"
+CHANGE = r"\b(rate|vel\w*|speed|dot|acc\w*|gyro\w*|std|cov\w*|accuracy)\b"
+"""Words in the names of directions, which jump by whole turns, and in those of what is none."""
 
 TURNING = 0.5
 """Standard deviation of the lateral acceleration of a moving car, m/s^2, with which neither its yaw rate nor its a_y can be
@@ -49,6 +56,9 @@ def check_samples(log: LogView) -> list[LogFinding]:
         coarse = _resolution(samples)
         still = _repeats(name, time, samples, coarse, _resting(log, time))
         findings += still if name in NEVER_STILL else _told(still)
+        words = kit.words_of(name)
+        if re.search(DIRECTION, words) is not None and re.search(CHANGE, words) is None:
+            samples = without_jumps(samples)
         findings += _told(_spikes(name, time, samples)) if name.startswith(JUMPY) else _spikes(name, time, samples)
     return findings
 

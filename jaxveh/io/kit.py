@@ -3,7 +3,7 @@
 from jaxveh.io.car import CAR_SCHEMA, STEERINGS, car_lines, car_of_toml, check_car_file
 from jaxveh.io.channel_map import CHANNEL_MAP_SCHEMA
 from jaxveh.io.datasets import dataset_of, frame_of, of_dataset
-from jaxveh.io.likely_names import MOST_LIKELY, likely_names, likely_words
+from jaxveh.io.likely_names import MOST_LIKELY, likely_names, likely_words, words_of
 from jaxveh.io.mcap_log import MCAP_SUFFIX
 from jaxveh.io.naming import MOST_NAMED, check_known
 from jaxveh.io.nested_log import in_words
@@ -63,5 +63,6 @@ __all__ = [
     "toml_number",
     "toml_string",
     "toml_text",
+    "words_of",
     "write_toml",
 ]

@@ -141,8 +141,8 @@ def read_recording(
     they are NaN in rows without a satellite.
 
     **Text** may have lines above the names of the columns, a line of units below them, `,`, `;`, tabs, `|` or blanks between
-    cells, and decimal commas; it may be an export of Haltech's NSP, or of a RaceCapture. What was assumed (lines above that are not read, an
-    encoding) is told in a `JaxvehWarning`.
+    cells, and decimal commas; it may be an export of Haltech's NSP, or a RaceCapture's log. What was assumed (lines above that
+    are not read, an encoding) is told in a `JaxvehWarning`.
 
     **Raises** `InputError` naming file, column, row, value and remedy: a missing file, an unknown suffix, a broken file, an
     empty log, an unknown column, a unit of another dimension, a cell that is not a number, time that does not increase.

@@ -86,3 +86,42 @@ def test_a_car_that_stands_has_any_course():
     random = np.random.default_rng(0).uniform(-np.pi, np.pi, time.size // 50 + 1).repeat(50)[: time.size]
     still = {name: np.where(stands, 0.0, channels[name]) for name in channels if name != "yaw"}
     assert not told(time, still | {"course": np.where(stands, random, channels["yaw"])}, "course")
+
+
+TURNS = {
+    "0 to 2 pi": (2 * np.pi, 0.0),
+    "-pi to pi": (2 * np.pi, -np.pi),
+    "0 to 360": (360.0, 0.0),
+    "-180 to 180": (360.0, -180.0),
+}
+
+
+@pytest.mark.parametrize(
+    "name", ["yaw", "heading", "course", "GPS Heading", "bearing", "HEADING_MOTION", "vehicleCourse"]
+)
+@pytest.mark.parametrize("form", TURNS)
+@pytest.mark.parametrize("seed", range(2))
+def test_a_direction_that_swings_about_its_jump_has_no_spikes(name, form, seed):
+    """A car that drives north for a while: its compass goes to and fro between 0 and 360."""
+    turn, low = TURNS[form]
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 60.0, 0.04)
+    angle = low + turn * (0.2 * np.sin(0.1 * time) + 0.002 * rng.normal(size=time.size))
+    angle[time > 55.0] = low + 0.002 * turn * rng.normal(size=np.count_nonzero(time > 55.0))
+    wrapped = low + np.mod(angle - low, turn)
+    assert np.count_nonzero(np.abs(np.diff(wrapped)) > 0.5 * turn) > 20
+    other = {"v_x": 20.0 + np.sin(time), "rate": np.sin(time)}
+    assert not [one for one in told(time, {name: wrapped, **other}, name) if "spike" in one.message]
+    wild = wrapped.copy()
+    wild[300] = low + np.mod(wild[300] + 0.3 * turn - low, turn)
+    found = [one for one in told(time, {name: wild, **other}, name) if "spike" in one.message]
+    assert len(found) == 1 and found[0].values["count"] == 1 and found[0].values["time"] == pytest.approx(time[300])
+
+
+@pytest.mark.parametrize("name", ["yaw_rate", "HEADING_RATE", "Yaw Velocity", "gyro yaw", "a_y"])
+def test_a_spike_of_a_whole_turn_in_what_is_no_direction_is_found(name):
+    time = np.arange(0.0, 20.0, 0.01)
+    values = 0.03 * np.sin(time) + 0.005 * np.random.default_rng(1).normal(size=time.size)
+    values[900] -= 6.25
+    found = [one for one in told(time, {"v_x": 20.0 + np.sin(time), name: values}, name) if "spike" in one.message]
+    assert len(found) == 1 and found[0].values["count"] == 1
