@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, warn
 from jaxveh.io.channel_map import ChannelMap
 from jaxveh.io.log import Column, Log, numeric
 from jaxveh.io.naming import check_known
 from jaxveh.io.optional import quiet_finalizers, require
 
 _TIME_SYNC = (0, 1)  # a master channel of no kind, or of time (others are of angle, distance or index)
+_FRAME = re.compile(r"(?:CAN|LIN|FLX|ETH|MOST)_[A-Za-z]*(?:Frame|Error|Event|Pdu|Message|WakeUp|Spike)(?:\.\w+)*")
+"""The names that ASAM's standard of bus logging gives to frames as they were on the bus, and to their parts."""
 
 
 class MdfLog(Log):
-    """An MDF file (version 3 or 4). Samples that the file marks as invalid are left out; texts are read as their raw numbers."""
+    """An MDF file (version 3 or 4). Samples that the file marks as invalid are left out; texts are read as their raw numbers.
+
+    `frames`: the channels that hold a bus's frames as they came, whose bytes are no measurement before they are decoded.
+    """
 
     def __init__(self, path: Path, mdf: Any):
         self.path, self._mdf = path, mdf
@@ -30,7 +36,9 @@ class MdfLog(Log):
         self._places = {name: found for name, found in places.items() if found}
         # asammdf also finds `yaw_rate\\ETKC:1` by its part before the device; that is no channel of its own.
         called = lambda place: mdf.groups[place[0]].channels[place[1]].name
-        self.names = tuple(name for name, found in self._places.items() if name in map(called, found))
+        names = [name for name, found in self._places.items() if name in map(called, found)]
+        self.names = tuple(name for name in names if _FRAME.fullmatch(name) is None)
+        self.frames = tuple(name for name in names if _FRAME.fullmatch(name) is not None)
 
     def column(self, name: str, group: int | None = None) -> Column:
         """Load one channel; `group` selects one if several groups have a channel of this name."""
@@ -87,15 +95,33 @@ def _of_words(raw: Any) -> Any:
 
 
 def open_mdf(path: Path, channels: ChannelMap | None) -> MdfLog:
-    """Open an MDF3 or MDF4 file; time is each group's own master channel, and a time column in the channel map is not used."""
+    """Open an MDF3 or MDF4 file; time is each group's own master channel, and a time column in the channel map is not used.
+
+    **Raises** `InputError` for a file that cannot be read, and for one that holds the frames of a bus alone.
+    """
     asammdf = require("asammdf", "reading MDF4")
     with quiet_finalizers():
         try:
-            return MdfLog(path, asammdf.MDF(path))
+            log = MdfLog(path, asammdf.MDF(path))
         except Exception as error:  # asammdf raises any kind of error for a damaged block
             reason = str(error) or type(error).__name__
+        else:
+            return _told_of_frames(log)
         gc.collect()
     raise InputError(f"{path}: is not a readable MDF file ({reason}).")
+
+
+def _told_of_frames(log: MdfLog) -> MdfLog:
+    """Return the log; warn of frames of a bus beside its channels, and raise `InputError` for frames alone."""
+    if not log.frames:
+        return log
+    story = f"{log.path}: holds frames of a bus that are not decoded ({log.frames[0]}, ...)"
+    advice = "decode them with the DBC file of the bus into MDF4 (asammdf's extract_bus_logging)"
+    if not log.names:
+        log.close()
+        raise InputError(f"{story}, and no other channel: {advice}.")
+    warn(f"{story}; they are not read. If a channel is missing, {advice}.")
+    return log
 
 
 def _stored(values: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jaxveh import InputError, io
+from jaxveh import InputError, JaxvehWarning, io
 
 asammdf = pytest.importorskip("asammdf")
 
@@ -148,3 +148,36 @@ def test_time_that_repeats_within_a_group(tmp_path):
     path = write(tmp_path / "log.mf4", [signal("v_x", [0.0, 1.0, 1.0], [1.0, 2.0, 3.0])])
     with pytest.raises(InputError, match=r"channel 'v_x': time\[2\] = 1.0 after time\[1\] = 1.0: must be strictly"):
         io.read_recording(path)
+
+
+FRAMES = ["CAN_DataFrame", "CAN_RemoteFrame", "CAN_ErrorFrame", "LIN_Frame", "LIN_SyncError", "FLX_Frame", "FLX_Pdu"]
+
+
+def frames_of(kind):
+    """A bus's messages as a bus logger stores them: their identifiers, lengths and bytes."""
+    time = np.arange(5) * 0.013
+    parts = [("ID", "<u4"), ("DataLength", "u1"), ("DataBytes", "u1", (8,))]
+    data = np.zeros(5, dtype=[(f"{kind}.{name}", *form) for name, *form in parts])
+    data[f"{kind}.ID"] = 0x120 + np.arange(5)
+    return asammdf.Signal(data, time, name=kind)
+
+
+@pytest.mark.parametrize("kind", FRAMES)
+@pytest.mark.parametrize("mapped", [False, True])
+def test_frames_alone_ask_for_the_file_that_decodes_them(tmp_path, kind, mapped):
+    path = write(tmp_path / "bus.mf4", [frames_of(kind)], [signal(f"{kind}.ID", [0.0, 0.1], [288, 289])])
+    channels = io.ChannelMap({"v_x": "VehicleSpeed"}) if mapped else None
+    with pytest.raises(
+        InputError, match=rf"bus.mf4: holds frames of a bus that .* \({kind}, .*: decode them with the DBC"
+    ):
+        io.read_recording(path, channels)
+
+
+@pytest.mark.parametrize("kind", FRAMES)
+def test_frames_beside_channels_are_left_out_aloud(tmp_path, kind):
+    names = ["v_x", "CAN_VehicleSpeed", "LIN_Temperature", "ETH_delay", "Frame"]
+    sound = [signal(name, [0.0, 0.02, 0.04], [1.0, 2.0, 3.0]) for name in names]
+    path = write(tmp_path / "bus.mf4", sound, [frames_of(kind)])
+    with pytest.warns(JaxvehWarning, match=rf"holds frames of a bus that are not decoded \({kind}, .*not read"):
+        recording = io.read_recording(path)
+    assert recording.names == tuple(names) and len(recording) == 3
