@@ -73,7 +73,8 @@ def slope_of(rig: RigTable, channel: str, name: str) -> tuple[float, float]:
     standard error.
 
     Least squares with an offset and, for lateral forces and moments, slip angle and camber together; where few rows have a
-    small slip, the smallest ones are used. nan where the data do not determine it.
+    small slip, the smallest ones are used. Slips that a rig holds at steps (0, 2 and 5 degrees) may be twice as large. nan where
+    the data do not determine it.
     """
     values = getattr(rig, channel)
     inputs = ["slip_ratio"] if name == "slip_ratio" else ["slip_angle", "camber"]
@@ -85,7 +86,11 @@ def slope_of(rig: RigTable, channel: str, name: str) -> tuple[float, float]:
         size = np.abs(getattr(rig, slip))
         if slip in varied and rows.sum() >= LEAST_ROWS:
             most = max(most, float(np.sort(size[rows])[LEAST_ROWS - 1]))
-        rows &= size <= most
+        # About one step, the slip is that step and noise, of which no force is the consequence.
+        steps = slip == name and not _varies(rig, slip, rows & (size <= most), tail=10)
+        rows &= size <= most * (1.0 + steps)
+    if not _varies(rig, name, rows):
+        return np.nan, np.nan
     columns = np.stack([getattr(rig, one)[rows] for one in varied] + [np.ones(rows.sum())], axis=1)
     if rows.sum() < LEAST_ROWS or np.linalg.matrix_rank(columns) < columns.shape[1]:
         return np.nan, np.nan
@@ -97,6 +102,9 @@ def slope_of(rig: RigTable, channel: str, name: str) -> tuple[float, float]:
     return float(solution[at]), float(np.sqrt(noise * np.linalg.inv(columns.T @ columns)[at, at]))
 
 
-def _varies(rig: RigTable, name: str) -> bool:
+def _varies(rig: RigTable, name: str, rows: np.ndarray | slice = slice(None), tail: float = 2.0) -> bool:
+    """Whether an input varies among these rows, without `tail` per cent of them at either end."""
     values = getattr(rig, name)
-    return values is not None and bool(np.ptp(np.percentile(values, [2, 98])) > LEAST_SPREAD[name])
+    if values is None or values[rows].size == 0:
+        return False
+    return bool(np.ptp(np.percentile(values[rows], [tail, 100.0 - tail])) > LEAST_SPREAD[name])

@@ -71,3 +71,36 @@ def test_what_is_not_swept_says_nothing(data):
     assert wrong_signs(dataclasses.replace(upright, camber=-upright.camber)) == ()
     few = data.take(np.arange(0, 123, 20))
     assert wrong_signs(dataclasses.replace(few, F_y=-few.F_y, F_x=None, M_z=None)) == ()
+
+
+STEPS = {"0, -2, -5": (0.0, -2.05, -4.9), "0, 2.5, 5": (0.0, 2.5, 5.0), "both sides": (-3.5, 0.0, 3.5)}
+
+
+def drive_brake(steps, seed):
+    """Sweeps of the slip ratio at steps of the slip angle, of a rig that yields a little to the force along."""
+    rng = np.random.default_rng(seed)
+    ratio = np.linspace(-0.15, 0.15, 61)
+    sweeps = [(np.radians(step), ratio, load, 0.0) for load in (1500.0, 3000.0) for step in steps]
+    columns = [np.concatenate([np.broadcast_to(sweep[i], ratio.size) for sweep in sweeps]) for i in range(4)]
+    columns = np.stack([*columns, np.full(columns[0].size, 11.2), np.full(columns[0].size, 0.8e5)])
+    rig = table(measured_of(tyres.typical_mf_tyre(4000.0), columns, CHANNELS), columns, None, 0.02, seed)
+    # The wheel turns by a hundredth of a degree a kilonewton, and the force has a lever of a few millimetres.
+    yielding = rig.slip_angle + 2e-7 * rig.F_x + 1e-4 * rng.normal(size=rig.load.size)
+    return dataclasses.replace(rig, slip_angle=yielding, M_z=rig.M_z + 0.006 * rig.F_x)
+
+
+@pytest.mark.parametrize("steps", STEPS)
+@pytest.mark.parametrize("seed", range(4))
+def test_steps_of_the_slip_angle_are_compared_with_each_other(steps, seed):
+    """Not the noise about one of them, which follows the forces, not they it."""
+    rig = drive_brake(STEPS[steps], seed)
+    assert wrong_signs(rig) == ()
+    turned = {one.pair for one in wrong_signs(dataclasses.replace(rig, M_z=-rig.M_z, F_y=-rig.F_y))}
+    assert turned == {"M_z, slip_angle", "F_y, slip_angle"}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_one_step_of_the_slip_angle_and_far_ones_say_nothing(seed):
+    rig = drive_brake((0.0, 9.0), seed)
+    assert wrong_signs(rig) == ()
+    assert wrong_signs(dataclasses.replace(rig, M_z=-rig.M_z, F_y=-rig.F_y)) == ()
