@@ -13,6 +13,7 @@ from jaxveh.io.toml import check_file, check_keys, read_toml, shorten, toml_numb
 CHANNEL_MAP_SCHEMA = """\
 # A channel map. Everything but `column` is optional.
 time = "Time"               # the time column; or { column = "Time", unit = "ms" }. Not used for MDF4.
+repeats = "last"            # which of several rows with one time counts where they contradict: "first" or "last". Default: none
 
 [channels.yaw_rate]         # the channel's name; `jaxveh.io.CANONICAL` lists the known names with their units
 column = "Gierrate"         # its name in the file
@@ -67,6 +68,7 @@ class ChannelMap:
     `channels`: name to `Channel` (a string is short for `Channel(column)`); without any, every column is a channel with its own
     name. `time`: the time column, None for the usual names. Of a text file: `separator` (a blank for any number of blanks),
     `decimal`, `names_line` (the number of the line with the names, from 1) and `encoding`; None for what the file shows.
+    `repeats`: of several rows with one time the one that counts where they contradict, `first` or `last`; None if none does.
     `source`: the origin of the map, for messages.
     """
 
@@ -76,16 +78,19 @@ class ChannelMap:
     decimal: str | None = None
     names_line: int | None = None
     encoding: str | None = None
+    repeats: str | None = None
     source: str = field(default="channel map", compare=False)
 
     def __post_init__(self):
         object.__setattr__(self, "channels", {name: _channel(entry) for name, entry in self.channels.items()})
         object.__setattr__(self, "time", None if self.time is None else _channel(self.time))
-        told = (self.time, self.separator, self.decimal, self.names_line, self.encoding)
+        told = (self.time, self.separator, self.decimal, self.names_line, self.encoding, self.repeats)
         if not self.channels and all(one is None for one in told):
             raise InputError(f"{self.source}: has no channel; add a table [channels.NAME] with its column.")
         if self.decimal is not None:
             check_one_of(f"{self.source}: decimal", self.decimal, (".", ","))
+        if self.repeats is not None:
+            check_one_of(f"{self.source}: repeats", self.repeats, ("first", "last"))
         if self.separator is not None and len(self.separator) != 1:
             raise InputError(f"{self.source}: separator = {self.separator!r}: must be one character.")
         if self.separator is not None and self.separator == self.decimal:
@@ -109,7 +114,7 @@ def read_channel_map(path: str | os.PathLike) -> ChannelMap:
     """
     path = path_of(path)
     content = read_toml(path)
-    keys = ("time", "channels", "csv")
+    keys = ("time", "repeats", "channels", "csv")
     check_file(path, content, "channel map", keys)
     check_keys(str(path), content, keys)
     csv = content.get("csv", {})
@@ -121,6 +126,7 @@ def read_channel_map(path: str | os.PathLike) -> ChannelMap:
         channels={name: _entry(f"{path}: [channels.{name}]", entry) for name, entry in channels.items()},
         time=_entry(f"{path}: time", content["time"]) if "time" in content else None,
         **{key: toml_text(f"{path}: {key}", csv[key]) for key in ("separator", "decimal", "encoding") if key in csv},
+        repeats=toml_text(f"{path}: repeats", content["repeats"]) if "repeats" in content else None,
         names_line=_whole(f"{path}: names_line", csv["names_line"], 1) if "names_line" in csv else None,
         source=str(path),
     )

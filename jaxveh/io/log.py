@@ -80,6 +80,7 @@ class TableLog(Log):
         clock: str = "",
     ):
         self.path, self.note, self._load, self._point = path, note, load, point
+        self._repeats = channels.repeats if channels else None
         self._twice = {heading for heading in headings if headings.count(heading) > 1}
         plain = {h: (h, units[h]) if h in units else split_unit(h) for h in headings}
         shorts = [name for name, _ in plain.values()]
@@ -109,7 +110,7 @@ class TableLog(Log):
         rows = np.isfinite(stamps)
         stamps, values = stamps[rows], self._values(name)[rows]
         # A row of what each device said last repeats samples.
-        if (joined := without_repeats(stamps, {name: values})) is not None:
+        if (joined := without_repeats(stamps, {name: values}, self._repeats)) is not None:
             stamps, values = joined[0], joined[1][name]
         if np.any(np.diff(stamps) <= 0):
             k = int(np.argmax(np.diff(stamps) <= 0))

@@ -108,6 +108,8 @@ SUFFIXES = tuple(_WRITE)
 """File name endings that are read and written."""
 LOG_SUFFIXES = tuple(_OPEN)
 """File name endings that are read."""
+FEW = 0.2
+"""The share of rows with the time of the row before, above which the clock stands still."""
 MOST_OTHERS = 8
 """The number of columns that were left out which a warning names, beside the first."""
 
@@ -182,7 +184,7 @@ def _read(
         if not loaded:
             raise InputError(f"{path}: has no channel except time.")
         note = log.note if as_saved else log.note or path.name
-    time, values = _joined(path, *merge(loaded))
+    time, values = _joined(path, *merge(loaded), chosen.repeats if chosen else None)
     if as_saved:
         # A recording leaves arrays of JAX unchanged; those of NumPy get JAX's current float type.
         values = {name: jnp.asarray(one) for name, one in values.items()}
@@ -194,17 +196,33 @@ def _read(
         told = chosen is not None and chosen.time is not None
         others = [] if told or np.all(np.diff(time) > 0) else likely_names("time", log.names)[:MOST_LIKELY]
         other = f' Or is {", ".join(others)} the time? Name it in a channel map: time = "COLUMN".' if others else ""
-        raise InputError(f"{path}: {error}{other}") from error
+        again = ' Or take one of such rows: repeats = "last" in a channel map, above its tables.' * _few_repeats(time)
+        raise InputError(f"{path}: {error}{again}{other}") from error
 
 
-def _joined(path: Path, time: np.ndarray, values: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Join rows with the same time stamp, with a warning, where none contradicts another."""
-    repeats = int(np.sum(np.diff(time) == 0))
-    joined = without_repeats(time, values) if repeats else None
-    if joined is None:
+def _few_repeats(time: np.ndarray) -> bool:
+    """Whether few of the time stamps (T,) are those of the row before, and none is earlier."""
+    steps = np.diff(time)
+    return bool(0 < np.sum(steps == 0) < FEW * steps.size and np.all(steps >= 0))
+
+
+def _joined(
+    path: Path, time: np.ndarray, values: dict[str, np.ndarray], counts: str | None
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Join rows with the same time stamp, with a warning: where none contradicts another, or the map says which counts."""
+    steps = np.diff(time)
+    repeats = int(np.sum(steps == 0))
+    if not repeats or np.any(steps < 0):
         return time, values
-    warn(f"{path}: {repeats} rows have the time of the row before and no other values: joined with it.")
-    return joined
+    story = f"{path}: {repeats} row{'s have' if repeats > 1 else ' has'} the time of the row before"
+    if (joined := without_repeats(time, values)) is not None:
+        warn(f"{story} and no other values: joined with it.")
+        return joined
+    chosen = without_repeats(time, values, counts) if counts else None
+    if chosen is None:
+        return time, values
+    warn(f"{story} and other values: of each column the {counts} counts.")
+    return chosen
 
 
 def write_recording(recording: Recording, path: str | os.PathLike, *, overwrite: bool = False) -> None:

@@ -4,6 +4,7 @@ import random
 import warnings
 
 import numpy as np
+import pandas
 import pytest
 
 from jaxveh import InputError, JaxvehWarning, io
@@ -221,6 +222,61 @@ def test_rows_with_one_time_are_joined_if_they_agree(tmp_path, seed, own):
     path.write_text(path.read_text() + f"{0.02 * (rows - 1):.2f},99,\n")
     with pytest.raises(InputError, match="must be strictly increasing"):
         io.read_recording(path, told)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("own", [False, True])
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+@pytest.mark.parametrize("counts", ["first", "last"])
+@pytest.mark.filterwarnings("ignore:.*of each column the:jaxveh.JaxvehWarning")
+def test_of_rows_with_one_time_the_one_counts_that_the_map_says(tmp_path, seed, own, suffix, counts):
+    """A receiver's sample comes at the instant of another device's, whose row held the sample before."""
+    draw, path = random.Random(seed), tmp_path / f"log{suffix}"
+    rows, clock, cells, wanted = 40, [], [], []
+    for k in range(rows):
+        lines = [
+            [draw.choice([draw.gauss(0, 1), np.nan]) for _ in range(2)] for _ in range(draw.choice([1, 1, 1, 1, 2, 3]))
+        ]
+        clock += [0.02 * k] * len(lines)
+        cells += lines
+        known = lambda column, lines=lines: [line[column] for line in lines if not np.isnan(line[column])]
+        wanted.append([(known(one) or [np.nan])[0 if counts == "first" else -1] for one in range(2)])
+    frame = pandas.DataFrame({"clock": clock, "a": [c[0] for c in cells], "b": [c[1] for c in cells]})
+    frame.to_csv(path, index=False) if suffix == ".csv" else frame.to_parquet(path)
+    one = lambda column: io.Channel(column, time=io.Channel("clock") if own else None)
+    channels = {"channels": {"v_x": one("a"), "a_y": one("b")}, "time": None if own else io.Channel("clock")}
+    told = io.ChannelMap(**channels, repeats=counts)
+    log = io.read_recording(path, told)
+    np.testing.assert_allclose(log.time, 0.02 * np.arange(rows))
+    np.testing.assert_allclose(np.stack([log["v_x"], log["a_y"]], axis=1), np.array(wanted), rtol=1e-6)
+    with pytest.raises(InputError, match="must be strictly increasing"):
+        io.read_recording(path, io.ChannelMap(**channels))
+
+
+def test_what_counts_is_told_and_asked_for(tmp_path):
+    path, chosen = tmp_path / "log.csv", tmp_path / "map.toml"
+    lines = [f"{0.02 * k:.2f},{k}" for k in range(20)]
+    path.write_text("\n".join(["time,v_x", *lines[:9], "0.16,99", *lines[9:], ""]))
+    with pytest.raises(
+        InputError, match=r'Or take one of such rows: repeats = "last" in a channel map, above its tables'
+    ):
+        io.read_recording(path)
+    chosen.write_text('repeats = "last"\n')
+    with pytest.warns(
+        JaxvehWarning, match=r"1 row has the time of the row before and other values: .* the last counts"
+    ):
+        assert io.read_recording(path, chosen)["v_x"][8] == 99.0
+    chosen.write_text('repeats = "newest"\n')
+    with pytest.raises(InputError, match=r"map.toml: repeats = 'newest': must be one of 'first', 'last'"):
+        io.read_recording(path, chosen)
+    path.write_text("time,v_x\n0.1,1\n0.2,2\n0.1,3\n0.1,4\n")
+    with pytest.raises(InputError, match="must be strictly increasing") as told:
+        io.read_recording(path, io.ChannelMap(repeats="last"))
+    assert "repeats =" not in str(told.value)
+    path.write_text("time,v_x\n0.1,1\n0.1,2\n0.2,3\n")
+    with pytest.raises(InputError, match="must be strictly increasing") as told:
+        io.read_recording(path)
+    assert "repeats =" not in str(told.value)
 
 
 def test_a_time_that_stands_still_is_told_with_the_other_clocks(tmp_path):
