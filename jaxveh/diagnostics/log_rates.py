@@ -31,6 +31,9 @@ FULL = (2.0 * np.pi, 360.0)
 NO_TURN = 0.05
 """Share of a turn by which a jump may differ from whole turns, beside the change of the rows around it."""
 
+QUICKEST_TURN = 2.5
+"""Yaw rate up to which a car may turn between two samples of a receiver that repeats the last one, rad/s."""
+
 _BESIDE = 5  # samples on either side of a jump
 
 _SMOOTH = 0.5  # s
@@ -61,7 +64,10 @@ def _jumps(log: LogView, name: str) -> list[LogFinding]:
     rows = np.arange(_BESIDE - 1, changes.size - _BESIDE + 1)
     usual = around(np.pad(changes, _BESIDE // 2, mode="edge"))[rows]
     step, level = changes[rows] - usual, around(samples)[_BESIDE:] - around(samples)[:-_BESIDE]
-    off = [np.abs(step - turn * np.round(step / turn)) < NO_TURN * turn for turn in FULL]
+    # A receiver of 1 Hz in rows of 20 Hz: the car has turned since its last sample, not since the last row.
+    news = np.maximum.accumulate(np.where(np.r_[True, changes != 0.0], np.arange(samples.size), 0))
+    turned = QUICKEST_TURN * (time[1:] - time[news[:-1]])[rows] / FULL[0]
+    off = [np.abs(step - turn * np.round(step / turn)) < (NO_TURN + turned) * turn for turn in FULL]
     whole = np.any([near & (np.abs(step) > 0.5 * turn) for near, turn in zip(off, FULL, strict=True)], axis=0)
     soon = np.diff(time)[rows] < 2.5 * np.median(np.diff(time))
     found = (np.abs(step) > 0.5 * FULL[0]) & (np.abs(level) > 0.5 * np.abs(step)) & ~whole & soon

@@ -80,6 +80,21 @@ def test_an_angle_of_a_counter_that_overflows_is_an_error(name, bits, step):
     )
 
 
+@pytest.mark.parametrize("rate", [1.0, 2.0, 5.0])
+@pytest.mark.parametrize("low", [0.0, -np.pi])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_course_that_a_slow_receiver_repeats_is_no_counter_that_overflows(rate, low, seed):
+    """A car in tight bends: between two samples it turns by up to 90 degrees, and the compass by a whole turn more or less."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 120.0, 0.05)
+    yaw_rate = 1.5 * np.sin(0.31 * time + rng.uniform(0, 6))
+    course = low + np.mod(np.cumsum(yaw_rate) * 0.05 + 0.02 * rng.normal(size=time.size) - low, 2 * np.pi)
+    held = course[(np.floor(time * rate + 1e-9) / rate / 0.05 + 1e-9).astype(int)]
+    assert np.count_nonzero(np.abs(np.diff(held)) > np.pi) > 2
+    found = told(time, {"speed": np.full(time.size, 15.0) + np.sin(time), "course": held}, "course")
+    assert not [one for one in found if "jump" in one.values]
+
+
 def test_a_car_that_stands_has_any_course():
     time, channels = drive()
     stands = time < 20.0
