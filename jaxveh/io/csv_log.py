@@ -64,6 +64,8 @@ def read_columns(path: Path, told: ChannelMap | None = None) -> TextTable:
         warn(f"{path}: {'; '.join(remarks)}.")
     headings = _named(layout.headings, frame)
     _tell_short_rows(path, layout, headings, frame, "strict")
+    # The index that pandas writes has no name.
+    headings = [heading or f"column {k}" for k, heading in enumerate(headings, start=1)]
     cells = _cells(with_numbers(headings), frame) | _cells(headings, frame)
     return TextTable(headings, cells, layout.units, layout.decimal, layout.clock)
 

@@ -224,6 +224,31 @@ def test_rows_with_one_time_are_joined_if_they_agree(tmp_path, seed, own):
         io.read_recording(path, told)
 
 
+@pytest.mark.parametrize("places", [(1,), (3,), (1, 2), (1, 4)])
+@pytest.mark.parametrize("line", ["", "s,m/s,rad/s"])
+@pytest.mark.filterwarnings("ignore:.*names are in line:jaxveh.JaxvehWarning")
+def test_columns_without_names_have_their_numbers(tmp_path, places, line):
+    """As pandas writes its index; a column at the end, too, unless each row ends with a separator."""
+    names, units = ["time", "v_x", "yaw_rate"], line.split(",") if line else [""] * 3
+    values = [0.01 * np.arange(6), 20.0 + np.arange(6), 0.1 * np.arange(6)]
+    for place in places:
+        names.insert(place - 1, "")
+        units.insert(place - 1, "")
+        values.insert(place - 1, 100.0 * place + np.arange(6))
+    rows = [",".join(f"{one:.3f}" for one in row) for row in zip(*values, strict=True)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([",".join(names), *([",".join(units)] if line else []), *rows, ""]))
+    log = io.read_recording(path)
+    assert set(log.names) == {"v_x", "yaw_rate", *(f"column {place}" for place in places)}
+    for place in places:
+        np.testing.assert_allclose(log[f"column {place}"], 100.0 * place + np.arange(6))
+    clock = io.Channel("column 1", offset=-100.0, scale=0.01) if places[0] == 1 else io.Channel("time")
+    told = io.read_recording(path, io.ChannelMap({"v_x": "v_x"}, time=clock))
+    np.testing.assert_allclose(np.diff(told.time), 0.01)
+    with pytest.raises(InputError, match=rf"no column 'speed'.*column {places[0]}"):
+        io.read_recording(path, io.ChannelMap({"v_x": "speed"}))
+
+
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("own", [False, True])
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
