@@ -179,7 +179,9 @@ class CarSpecification(CarTable):
             key, tyre = f"{axle}_cornering_stiffness", getattr(self, axle)
             if getattr(self, key) is None:
                 if tyre is None:
-                    raise InputError(f"{key} is missing: give it in N/rad, or tyre coefficients under [{axle}].")
+                    told = getattr(self, f"{axle}_tyre") is not None
+                    why = f" {axle}_tyre is a single wheel's: `jaxveh tyre show` prints its stiffness." * told
+                    raise InputError(f"{key} is missing: give it in N/rad, or tyre coefficients under [{axle}].{why}")
                 object.__setattr__(self, key, tyre.B * tyre.C * tyre.D)
 
     def save(self, path: str | os.PathLike, *, overwrite: bool = False) -> None:

@@ -8,6 +8,7 @@ unit (10) and values (10 each).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -66,8 +67,9 @@ class _Conversion:
 def read_tydex(path: str | Path) -> TydexFile:
     """Read a TYDEX file; each channel is `factor (raw + offset of the raw value) + offset of the physical value`.
 
-    **Raises** `InputError`, with the line, for a file without **MEASURCHANNELS or **MEASURDATA, a channel that occurs twice, a
-    row with another number of columns than there are channels, and a cell that is not a number (`NOTAVAIL` is a missing one).
+    **Raises** `InputError`, with the line, for a file without **MEASURCHANNELS or **MEASURDATA, or with several of the first; a
+    channel that occurs twice, a row with another number of columns than there are channels, and a cell that is not a number
+    (`NOTAVAIL` is a missing one).
     """
     path = path_of(path)
     check_readable(path)
@@ -78,6 +80,7 @@ def read_tydex(path: str | Path) -> TydexFile:
 def parse_tydex(text: str, source: str = "TYDEX file") -> TydexFile:
     """Parse the text of a TYDEX file; see `read_tydex`."""
     sections = _sections(text)
+    _check_one_measurement(text, source)
     for needed in ("MEASURCHANNELS", "MEASURDATA"):
         if not sections.get(needed):
             raise InputError(f"{source}: no section **{needed} with lines: there are no measurements in TYDEX format.")
@@ -92,6 +95,17 @@ def parse_tydex(text: str, source: str = "TYDEX file") -> TydexFile:
     constants = {c.name: c for c in (_constant(line, number) for number, line in sections.get("CONSTANTS", []))}
     header = {line[_NAME].strip(): line[40:].strip() for _, line in sections.get("HEADER", [])}
     return TydexFile(source, header, tuple(line for _, line in sections.get("COMMENTS", [])), constants, channels)
+
+
+def _check_one_measurement(text: str, source: str) -> None:
+    lines = enumerate(text.splitlines(), start=1)
+    counted = takewhile(lambda one: not one[1].upper().startswith("**END"), lines)
+    begins = [k for k, line in counted if line.upper().startswith("**MEASURCHANNELS")]
+    if len(begins) > 1:
+        raise InputError(
+            f"{source}: **MEASURCHANNELS is {len(begins)} times there, in lines {', '.join(map(str, begins))}: several "
+            "measurements in one file. Write a file for each, with all sections above the first, and give them together."
+        )
 
 
 def _sections(text: str) -> dict[str, list[tuple[int, str]]]:

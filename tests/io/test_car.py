@@ -96,6 +96,10 @@ BROKEN = {
         PLAIN.replace("front_cornering_stiffness = 9e4", ""),
         r"front_cornering_stiffness is missing",
     ),
+    "a tyre's file alone": (
+        'rear_tyre = "rear.tir"\n' + PLAIN.replace("rear_cornering_stiffness", "name = 'x' #"),
+        r"rear_cornering_stiffness is missing: .*rear_tyre is a single wheel's",
+    ),
     "unknown": ("yaw_inerta = 3\n" + PLAIN, r"no key 'yaw_inerta' \(did you mean 'yaw_inertia'\?\); there are: yaw_in"),
     "position": ("sensor_position = [1, 2]" + PLAIN, r"sensor_position = \[1, 2\]: must be \[x, y, z\]"),
     "far position": (

@@ -49,6 +49,23 @@ def test_sections_header_and_comments():
     np.testing.assert_array_equal(file.channels["MZW"].values, [50.0, np.nan])
 
 
+@pytest.mark.parametrize("count", [2, 3])
+@pytest.mark.parametrize("end", ["", "  "])
+def test_several_measurements_in_one_file_are_told_with_their_lines(tmp_path, count, end):
+    """As CarMaker's generator of tyres writes them: across and along, each with channels and rows of its own."""
+    whole = text(PLAIN, ROWS).splitlines()
+    more = [*whole[whole.index("**MEASURCHANNELS") : whole.index("**END")]]
+    lines = [*whole[: whole.index("**END")], *more * (count - 1), f"{end}**END"]
+    begins = [k for k, line in enumerate(lines, start=1) if line == "**MEASURCHANNELS"]
+    (tmp_path / "both.tdx").write_text("\n".join(lines))
+    with pytest.raises(
+        InputError, match=rf"is {count} times there, in lines {begins[0]}, .*{begins[-1]}: .*a file for each"
+    ):
+        io.read_rig_table(tmp_path / "both.tdx")
+    (tmp_path / "one.tdx").write_text("\n".join([*whole, *more]))
+    assert len(io.read_rig_table(tmp_path / "one.tdx").load) == len(ROWS)
+
+
 def test_the_signs_of_the_file_and_the_units_of_the_package():
     found = patch(PLAIN, ROWS, [("INFLPRES", "bar", 2.5), ("INCLANGL", "deg", -1)])
     np.testing.assert_allclose(found["slip_angle"], np.radians([2.0, -2.0]))
