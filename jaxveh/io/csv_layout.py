@@ -90,7 +90,7 @@ def _layout(
     below = [k + 1 for k in range(names + 1, first) if k != units and not _is_blank(lines[k])]
     if below and not (told and told.names_line):
         remarks.append(f"between the names and the rows, line {', '.join(map(str, below))} is not read")
-    told_units = [] if units is None else [without_brackets(one) for one in _split(lines[units], separator)]
+    told_units = [] if units is None else [without_brackets(one) for one in _head(lines[units], separator)]
     told_units = capture[1] if capture else told_units
     clock = CLOCK if capture and headings.count(CLOCK) == 1 else ""
     by_name = dict(zip([*headings, *with_numbers(headings)], [*told_units, *told_units], strict=False))
@@ -152,10 +152,11 @@ def _places(
     if named is not None:
         if named > len(lines):
             raise InputError(f"{path}: names_line = {named}: must be at most {len(lines)}.")
-        usual = separator or max(",;\t|", key=lines[named - 1].count)
+        line = lines[named - 1]
+        usual = separator or (max(",;\t|", key=line.count) if any(map(line.count, ",;\t|")) else BLANKS)
         below = [k for k in range(named, len(lines)) if not _is_blank(lines[k])]
         first = next((k for k in below if _is_row(_split(lines[k], usual))), named)
-        units = next((k for k in below if k < first and _are_units(_split(lines[k], usual))), None)
+        units = next((k for k in below if k < first and _are_units(_head(lines[k], usual))), None)
         return named - 1, units, first, usual
     for first in range(1, len(lines)):
         for one in (separator,) if separator else SEPARATORS:
@@ -196,16 +197,21 @@ def _above(lines: Sequence[str], first: int, separator: str, counts: tuple[int, 
     be in the one before it, if the last line has cells that are empty or alike (sources of the columns): it names none.
     """
     above = [k for k in range(first) if not _is_blank(lines[k])][-4:]
-    if len(above) > 1 and sum(map(bool, _split(lines[above[-1]], separator))) == 1:
+    if len(above) > 1 and sum(map(bool, _head(lines[above[-1]], separator))) == 1:
         above.pop()
     above = above[-3:]
-    cells = [_split(lines[k], separator) for k in above]
+    cells = [_head(lines[k], separator) for k in above]
     fits = lambda one: _filled(one) in counts and _are_words(one)
     names_none = len(above) > 2 and len(set(cells[-1])) < len(cells[-1])
     for last in range(len(above) - 1, 0 if names_none else max(0, len(above) - 2), -1):
         if _are_units(cells[last]) and fits(cells[last - 1]):
             return above[last - 1], above[last]
     return (above[-1], None) if above and fits(cells[-1]) else None
+
+
+def _head(line: str, separator: str) -> list[str]:
+    """Return the cells of a line above the rows, which some programs mark as a comment: `# time v_x`."""
+    return _split(line.lstrip("\ufeff ").removeprefix("#"), separator)
 
 
 def _split(line: str, separator: str) -> list[str]:
@@ -216,7 +222,7 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _names(line: str, separator: str, path: Path, number: int) -> list[str]:
-    names = _split(line.removeprefix("#"), separator)
+    names = _head(line, separator)
     if not names or all(map(is_number, names)) or all(map(is_number, line.split())):
         raise InputError(f"{path}: line {number + 1} holds numbers only; the first line must name the columns.")
     return names

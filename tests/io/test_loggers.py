@@ -367,3 +367,25 @@ def test_units_in_brackets_are_those_inside(suffix, brackets, tmp_path):
     assert read.unit("v_x") == "m/s"
     if suffix in (".csv", ".txt"):  # other formats keep what they were given
         assert read.unit("hydraulics") == "bar"
+
+
+@pytest.mark.parametrize("separator", [" ", ",", ";", "\t"])
+@pytest.mark.parametrize("mark", ["# ", "#", "#  "])
+@pytest.mark.parametrize("units", [None, ["s", "km/h", "deg/s"]])
+@pytest.mark.parametrize("above", ["", "# driven by A. N. Other\n", "# run 7\n#\n", "a logger's own words\n"])
+@pytest.mark.filterwarnings("ignore:.*names are in line:jaxveh.JaxvehWarning")
+def test_names_and_units_may_be_marked_as_comments(tmp_path, separator, mark, units, above):
+    """As numpy's savetxt and simulators write them."""
+    factors = [1.0, 3.6, 180 / np.pi] if units else [1.0, 1.0, 1.0]
+    table = np.column_stack([TIME, TRUTH["v_x"], TRUTH["yaw_rate"]]) * factors
+    head = [separator.join(line) for line in (["time", "v_x", "yaw_rate"], *([units] if units else []))]
+    rows = [separator.join(f"{one:.9f}" for one in row) for row in table]
+    path = tmp_path / "log.txt"
+    path.write_text(above + "\n".join([*(mark + line for line in head), *rows, ""]))
+    said = len(above.splitlines()) + 1
+    for told in (None, io.ChannelMap(names_line=said), io.ChannelMap(separator=separator)):
+        found = io.read_recording(path, told)
+        assert found.names == ("v_x", "yaw_rate")
+        np.testing.assert_allclose(found.time, TIME, atol=1e-9)
+        for name in found.names:
+            np.testing.assert_allclose(found[name], TRUTH[name], rtol=1e-6, atol=1e-8)
