@@ -20,7 +20,7 @@ _CORNERS = {
 _LIKELY = {
     "v_x": r"^v$|\bvx\b|^v (ego|veh\w*|car|x|lon\w*)\b|\b(speed|spd|vel\w*|\w*geschw\w*|linear x)\b",
     "yaw_rate": r"\b(yaw|gier|psi|heading) ?(rate|rt|vel\w*|speed|dot|p)\b|\b(gyro\w*|ang\w*( rate| vel\w*)?|rate|omega|g|w) ?z\b"
-    r"|\bz (ang\w* )?(rate|gyro|vel\w*)\b|^omega$|\ba ?vz\b|\bvel\w* yaw\b|\bgps gyro\b|\bgierrate\b|\bgiergeschw\w*",
+    r"|\bz (ang\w* )?(rate|gyro|vel\w*|rotation)\b|^omega$|\ba ?vz\b|\bvel\w* yaw\b|\bgps gyro\b|\bgierrate\b|\bgiergeschw\w*",
     "a_y": _OF(r"(lat(eral)?|quer)", "y"),
     "a_x": _OF(r"(long(itudinal)?|lon|inline|l(ä|ae)ngs)", "x"),
     "steer": r"\b(steer\w*|lenk\w*|swa|sas)\b|\bstr( ?whl| ang)|^delta( (f|fl|front))?$",
@@ -36,6 +36,7 @@ _OTHER = {
     **dict.fromkeys((f"wheel_speed_{at}" for at in _CORNERS), _WHEEL),
     "v_x": r"\b(wheel\w*|whl\w*|w ?spd|wss|rad\w*|engine|motor|fan|wind|turbo\w*|shaft|ang\w*|yaw|giergeschw\w*|roll|pitch|"
     r"lat\w*|quer\w*|vert\w*|y|z|north|east|down|[frvh][lr]|[lr][fr]|steer\w*|lenk\w*|limit|gyro)\b",
+    "time": r"\b(lap|sector|predicted|best|delta)\b",  # these begin again in every lap
     "steer": r"\b(rate|speed|vel\w*|torque|force|moment\w*|current|assist|arm|status)\b",
 }
 _NO_MEASUREMENT = (

@@ -38,6 +38,7 @@ def open_dat(path: Path, channels: ChannelMap | None) -> Log:
     return open_mdf(path, channels) if is_mdf else open_csv(path, channels)
 
 
+_DECODE = "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)"
 _BUS_FRAME = re.compile(rb"\s*\(\d+\.\d+\)\s+\w+\s+[0-9A-Fa-f]+(#|\s+\[\d+\])")
 """A line of can-utils: `(1631416514.717133) can0 0D2#0000FFFF`."""
 
@@ -72,7 +73,6 @@ _WRITE = {
     ".mdf": write_mdf,
     ".nc": write_recording_netcdf,
 }
-_DECODE = "decode it with its DBC file into MDF4 (asammdf's extract_bus_logging)"
 _ELSEWHERE = {
     ".xlsx": "save the sheet as CSV",
     ".xls": "save the sheet as CSV",

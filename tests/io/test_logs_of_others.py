@@ -13,7 +13,8 @@ from jaxveh.io.canonical import CANONICAL
 
 NAMES = {
     "v_x": "Ground Speed, Speed (OBD), vEgo, VehSpd, GPS_Speed, vx, speedKmh, VelForward, Fahrzeuggeschwindigkeit, v_mps",
-    "yaw_rate": "yawRate, Z_ANGLE_RATE, AngRateZ, gyro_z, imu_gz_rps, angular_velocity.z, omega, psi_dot, Gierrate, YawRt",
+    "yaw_rate": "yawRate, Z_ANGLE_RATE, AngRateZ, gyro_z, imu_gz_rps, angular_velocity.z, omega, psi_dot, Gierrate, YawRt, "
+    "z-rotation-gyroscope",
     "a_y": "G Force Lat, LatAcc, lateral_acc, Y_ACCELERATION, linear_acceleration.y, ay, accel_y, Querbeschleunigung",
     "a_x": "G Force Long, InlineAcc, longitudinal_acc, ax_mps2, LonAcc, Längsbeschleunigung, accx_can",
     "steer": "Steered Angle, SteeringWheelAngle, steeringAngleDeg, delta, StrWhlAng, Lenkradwinkel, SWA, steer_deg",
@@ -23,7 +24,8 @@ NAMES = {
 }  # fmt: skip
 OTHERS = (
     "Engine RPM, Steering Arm Force, Fan Speed, wind speed, deltadelta, targetLateralAcceleration, steerCommand, "
-    "Brake Pressure Wheel FL, Fuel Level, device_update_rate, a_y_std, gps_accuracy, imu_gy_rps, roll rate, Boost, distance"
+    "Brake Pressure Wheel FL, Fuel Level, device_update_rate, a_y_std, gps_accuracy, imu_gy_rps, roll rate, Boost, distance, "
+    "x-rotation-gyroscope, Lap Time, Predicted Lap Time, time_lap, BestSectorTime"
 )
 
 
