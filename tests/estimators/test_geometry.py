@@ -108,7 +108,7 @@ def test_what_was_learned_is_a_file_that_the_next_drive_starts_from(tmp_path):
     # A unit elsewhere in the car stays there.
     elsewhere = geometry.METHODS["learner"].make(dataclasses.replace(CAR, sensor_position=(0.5, 0.0, 0.0)))
     other = geometry.start_from(elsewhere, geometry.read_learned(path))
-    assert float(other.inner.steer_offset) == float(again.steer_offset) and float(other.unit_x) == 0.5
+    assert float(other.inner.steer_offset) == float(again.steer_offset) and float(other.preparation.unit_x) == 0.5
     start = geometry.estimate(again, drive(again.needs, offset=0.001).rows(slice(0, 50)))
     assert start.known.steer_offset[0]
     assert geometry.numbers_learned(geometry.live(again).init(0.0, {})[1]).entries["steer_offset"].value == float(

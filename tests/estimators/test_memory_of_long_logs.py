@@ -59,7 +59,7 @@ def test_sideslip_with_bands(smoothed):
             t=jnp.linspace(0.0, 0.01 * rows, rows)
         )
         if smoothed:
-            return filters.Extended(), model, members, long
+            return filters.Extended(), model, members, long, jnp.asarray(rows)
         names = estimators.rear_axle.RearAxleReport
         return filters.Extended(), members, long, names(*[jnp.zeros(rows) for _ in names._fields])
 
