@@ -32,10 +32,16 @@ def wheelbase_of(car: Any) -> float | None:
 
 
 def steer_at_03g(car: Any) -> float | None:
-    """Return the steer in a steady turn at 0.3 g and `SPEED` with linear tyres, rad; None for a car that has none."""
+    """Return the steer in a steady turn at 0.3 g and `SPEED` with linear tyres, rad; None for a car that has none.
+
+    Rear wheels that are steered in a ratio to the front wheels are included; those with an input of their own are straight.
+    """
     if wheelbase_of(car) is None or understeer_of(car) is None:
         return None
-    gain = float(linear_single_track(car).lateral_acceleration_gain(SPEED))
+    linear = linear_single_track(car)
+    if "steer" not in linear.steering.inputs:
+        return None
+    gain = float(linear.lateral_acceleration_gain(SPEED))
     return 0.3 * GRAVITY / gain if gain > 0 else None
 
 

@@ -110,14 +110,28 @@ def test_the_sine_with_dwell_is_judged_by_the_cars_own_steer_at_03g(capsys):
     linear = vehicles.linear_single_track(car)
     straight = 0.3 * 9.80665 * float(linear.wheelbase / (80 / 3.6) ** 2 + linear.understeer_gradient)
     assert steer_at_03g(car) == pytest.approx(straight, rel=1e-6)
-    # Rear wheels that turn with the front ones need more steer; those of a car inside another are its own.
-    alike = dataclasses.replace(car, steering=vehicles.FourWheelSteering(0.25))
-    assert steer_at_03g(alike) == pytest.approx(straight / 0.75, rel=1e-6)
-    assert steer_at_03g(vehicles.Steered(alike, 16.0)) == steer_at_03g(alike)
-    assert steer_at_03g(dataclasses.replace(car, steering=vehicles.FourWheelSteering(1.0))) is None
     assert steer_at_03g(vehicle_of("passenger_car", "longitudinal")) is None
     print_numbers({"sine with dwell": {"amplitude": 3.5, "stable": True, "responsive": None, "displacement": math.nan}})
     assert capsys.readouterr().out.strip().endswith("sine with dwell: amplitude 3.5, stable yes, responsive not judged")
+
+
+RATIO = {"four-wheel": 0.25}
+"""The rear angle over the front angle at the steer at 0.3 g, by the kind of steering; of the others it is 0."""
+
+
+@pytest.mark.parametrize("kind", kit.STEERINGS)
+def test_the_steer_at_03g_is_that_of_every_steering_or_of_none(kind):
+    car = vehicle_of("passenger_car", "single-track")
+    make = kit.STEERINGS[kind]
+    steered = dataclasses.replace(car, steering=make(RATIO[kind]) if kind in RATIO else make())
+    if kind == "independent":
+        assert steer_at_03g(steered) is None
+        return
+    expected = steer_at_03g(car) / (1.0 - RATIO.get(kind, 0.0))
+    assert steer_at_03g(steered) == pytest.approx(expected, rel=1e-6)
+    assert steer_at_03g(vehicles.Steered(steered, 16.0)) == steer_at_03g(steered)
+    alike = dataclasses.replace(car, steering=vehicles.FourWheelSteering(1.0))
+    assert steer_at_03g(alike) is None, "wheels that are turned alike turn no car"
 
 
 @pytest.mark.parametrize("fidelity", [name for name in kit.FIDELITIES if name != "kinematic-trailer"])

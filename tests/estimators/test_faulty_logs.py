@@ -102,14 +102,29 @@ def test_shifting_takes_samples_as_they_are():
     np.testing.assert_array_equal(moved["v_x"], log["v_x"])
 
 
-def test_a_low_pass_of_the_cars_file_is_made_up_for():
+@pytest.fixture(scope="module")
+def behind_a_low_pass():
+    """RMSE of sideslip, degrees: with a file that says nothing of the low-pass, one that does, and of the log without it."""
     log = sound()
     slow = sensors.low_pass(log, ("a_x", "a_y", "yaw_rate"), 0.5)
     told = dataclasses.replace(CAR, low_pass=0.5)
-    silent, knowing = (estimators.sideslip.estimate(car, slow.without("v_y")) for car in (CAR, told))
-    score = lambda found: estimators.sideslip.score(CAR, found, log)["sideslip_rmse_deg"]
-    at_best = score(estimators.sideslip.estimate(CAR, log.without("v_y")))
-    assert score(knowing) < 1.05 * at_best and score(silent) > 1.6 * score(knowing)
+    found = [
+        estimators.sideslip.estimate(car, one.without("v_y")) for car, one in ((CAR, slow), (told, slow), (CAR, log))
+    ]
+    return [estimators.sideslip.score(CAR, one, log)["sideslip_rmse_deg"] for one in found]
+
+
+def test_a_low_pass_of_the_cars_file_is_made_up_for(behind_a_low_pass):
+    silent, knowing, at_best = behind_a_low_pass
+    # It is worth saying.
+    assert knowing < 1.05 * at_best and silent > 1.6 * knowing
+
+
+@pytest.mark.xfail(strict=True, reason="it costs 1.68 times the error at best; with a curve that is trusted less, 1.50")
+def test_a_low_pass_that_the_file_does_not_tell_costs_what_it_cost_at_first(behind_a_low_pass):
+    """The first criterion, which stands until it holds."""
+    silent, _, at_best = behind_a_low_pass
+    assert silent > 1.8 * at_best
 
 
 def test_wild_and_stuck_values_are_missing_and_others_are_not():

@@ -47,17 +47,31 @@ def share_of_prior(log):
     return float(np.sqrt(fit.covariance[0, 0])) / estimators.sideslip.SPREADS[fit.names[0].split(".")[-1]]
 
 
-def test_a_log_that_contradicts_itself_has_wider_bands(monkeypatch):
-    """In the second half, a_y is 1 m/s^2 higher, which no equation of the model allows for; the sound drive nearly keeps its
-    bands."""
+@pytest.fixture(scope="module")
+def of_two_logs():
+    """What `share_of_prior` says of a sound log and of one whose a_y is 1 m/s^2 higher in the second half, which no equation of
+    the model allows for; then the same as if there were no measure of it, only a fit of the whole log."""
     log = test_rear_axle.drive_of(test_sideslip.CAR)
     late = np.asarray(log.time) > np.mean(log.time)
-    broken = log.replace(a_y=np.asarray(log["a_y"]) + 1.0 * late)
-    sound, wide = share_of_prior(log), share_of_prior(broken)
-    # As if there were no such measure: only a fit of the whole log.
-    monkeypatch.setattr(rear_axle_fit, "disagreement", lambda *fits: 1.0)
-    assert share_of_prior(log) <= sound < 1.05 * share_of_prior(log)
-    assert wide > 1.5 * share_of_prior(broken) and wide > 2 * sound
+    logs = log, log.replace(a_y=np.asarray(log["a_y"]) + 1.0 * late)
+    found = [share_of_prior(one) for one in logs]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rear_axle_fit, "disagreement", lambda *fits: 1.0)
+        return *found, *(share_of_prior(one) for one in logs)
+
+
+def test_a_log_that_contradicts_itself_has_wider_bands(of_two_logs):
+    sound, wide, sound_alone, wide_alone = of_two_logs
+    # Halves of a sound log disagree by 1 in the mean, by a little more as often as by less.
+    assert sound_alone <= sound < 1.05 * sound_alone
+    assert wide > 1.5 * wide_alone and wide > 2 * sound
+
+
+@pytest.mark.xfail(strict=True, reason="with today's prior of the curve the halves of this log disagree by 1.05")
+def test_a_sound_log_keeps_its_bands(of_two_logs):
+    """The first criterion, which stands until it holds."""
+    sound, _, alone, _ = of_two_logs
+    assert sound == alone
 
 
 def test_noises_of_rows_that_are_alike_are_larger_than_fitted_in_every_form_of_the_result(monkeypatch):

@@ -7,19 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import InputError, manoeuvres, vehicles
+from jaxveh import InputError, manoeuvres
 from jaxveh.manoeuvres import MANOEUVRES, Motion, as_driver, manoeuvre_options, named_manoeuvre
 from jaxveh.manoeuvres.options import FUNCTIONS
-
-
-@pytest.mark.parametrize("name", MANOEUVRES)
-def test_the_options_of_a_car_inside_another_are_its_own(name):
-    car = vehicles.passenger_car()
-    own = manoeuvres.options_of_car(name, car)
-    assert manoeuvres.options_of_car(name, vehicles.Steered(car, 16.0)) == own
-    if "understeer_gradient" in own:
-        assert own["understeer_gradient"] == float(vehicles.linear_single_track(car).understeer_gradient)
-        assert own["wheelbase"] == float(car.wheelbase)
 
 
 @pytest.mark.parametrize("name", MANOEUVRES)

@@ -3,8 +3,9 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from test_every_vehicle import CARS
 
-from jaxveh import InputError, roads, tyres, vehicles
+from jaxveh import InputError, manoeuvres, roads, tyres, vehicles
 from jaxveh._core.names import record
 from jaxveh.io import CarSpecification, CommonRoadSpecification
 from jaxveh.tyres import Contact
@@ -28,6 +29,25 @@ def test_a_commonroad_vehicle_s_limits_are_its_numbers_each_in_its_place():
     for name in LIMITS:
         with pytest.raises(InputError, match=f"limits of the vehicle: {name} missing"):
             vehicles.commonroad_limits(CommonRoadSpecification(1.2, 1.5, **{**LIMITS, name: None}))
+
+
+WITHIN = [name for name, car in CARS.items() if hasattr(car.make(), "vehicle")]
+
+
+@pytest.mark.parametrize("name", WITHIN)
+def test_the_options_of_a_car_inside_another_are_its_own(name):
+    car = CARS[name].make()
+    inner = car
+    while hasattr(inner, "vehicle"):
+        inner = inner.vehicle
+    assert vehicles.kit.innermost_car(car) is inner and vehicles.kit.innermost_car(inner) is inner
+    for manoeuvre in manoeuvres.MANOEUVRES:
+        own = manoeuvres.options_of_car(manoeuvre, inner)
+        assert manoeuvres.options_of_car(manoeuvre, car) == own
+    own = manoeuvres.options_of_car("steady-circle", inner)
+    if hasattr(inner, "front"):
+        assert own["understeer_gradient"] == float(vehicles.linear_single_track(inner).understeer_gradient)
+        assert own["wheelbase"] == float(inner.front_axle_to_cg) + float(inner.rear_axle_to_cg)
 
 
 FOUR_WHEEL = {"steering": "four-wheel", "rear_steer_ratio": -0.2}
