@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -65,13 +65,37 @@ def summary(lines: Sequence[Line]) -> dict[str, float]:
         "over_open_loop_worst": max(over),
         "worse_than_open_loop": float(np.mean([value > 1.0 for value in over])),
         "over_as_told_median": statistics.median(line.over_as_told for line in done),
+        "over_as_told_worst": max(line.over_as_told for line in done),
         "rmse_median_deg": statistics.median(line.rmse for line in done),
         "open_loop_median_deg": statistics.median(line.open_loop for line in done),
         "coverage_50": float(np.mean([line.coverage_50 for line in done])),
         "coverage_95": float(np.mean([line.coverage_95 for line in done])),
+        "coverage_95_lowest": min(line.coverage_95 for line in done),
         "coverage_95_lowest_tenth": float(np.quantile([line.coverage_95 for line in done], 0.1)),
         "crps_over_constant_band": statistics.median(line.crps / line.crps_constant for line in done),
     }
+
+
+COURSE_HEAD = {
+    "RMSE [deg]": "rmse_median_deg", "open loop": "open_loop_median_deg", "over open loop": "over_open_loop_median",
+    "worst": "over_open_loop_worst", "over as told": "over_as_told_median", "worst, as told": "over_as_told_worst",
+    "in 95 %": "coverage_95", "lowest": "coverage_95_lowest",
+}  # fmt: skip
+"""Columns of the table of courses, medians unless stated otherwise, and their names in a `summary`."""
+
+
+def show_courses(summaries: Mapping[str, Mapping[str, float]], title: str) -> None:
+    """Print a table with the summary of each course."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left")
+    for i, name in enumerate(("course", "drives", "failed", *COURSE_HEAD)):
+        table.add_column(name, justify="left" if i == 0 else "right")
+    for course, about in summaries.items():
+        values = [f"{about[name]:.2f}" if name in about else "" for name in COURSE_HEAD.values()]
+        table.add_row(course, str(about["runs"]), str(about["failed"]), *values)
+    Console(width=180).print(table)
 
 
 AT_MOST = {

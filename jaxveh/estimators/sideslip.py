@@ -113,6 +113,9 @@ def calibrate(
     (`rear_axle_fit.ALIKE`). Each half of the recordings is fitted, too: where the halves contradict each other, the parameters'
     covariance is larger and the bands of an estimate are wider (`rear_axle_fit.disagreement`).
 
+    A log that moves the car at few frequencies, such as a slalom or a slow ramp of steer, says little of it: its rows count less
+    against the car's file (`rear_axle_fit.VARIED`), and the bands are wider. `little_told` names what remained open.
+
     An a_y that is late, judged by the fitted car and the yaw rate, is shifted, and the car fitted again (`alignment`).
 
     **Raises** `InputError` for missing channels (including a_y), or a span shorter than `SHORTEST`; `FilterError` if the fit

@@ -261,6 +261,7 @@ def test_a_fit_that_runs_out_of_steps_says_so(monkeypatch):
 def test_the_likelihood_counts_for_less_than_it_says_and_the_prior_as_it_is(monkeypatch):
     log = drive_of(test_sideslip.CAR).without("v_y")
     calibrate = lambda: estimators.sideslip.calibrate(test_sideslip.CAR, log).fit.parameters_std
+    monkeypatch.setattr(rear_axle_fit, "VARIED", 0.0)
     wide, most = calibrate(), rear_axle_fit.OVERCONFIDENCE**0.5
     monkeypatch.setattr(rear_axle_fit, "OVERCONFIDENCE", 1.0)
     narrow = calibrate()

@@ -50,12 +50,13 @@ def share_of_prior(log):
 @pytest.fixture(scope="module")
 def of_two_logs():
     """What `share_of_prior` says of a sound log and of one whose a_y is 1 m/s^2 higher in the second half, which no equation of
-    the model allows for; then the same as if there were no measure of it, only a fit of the whole log."""
+    the model allows for; then the same as if there were no measure of it, only a fit of the whole log. Both count as varied."""
     log = test_rear_axle.drive_of(test_sideslip.CAR)
     late = np.asarray(log.time) > np.mean(log.time)
     logs = log, log.replace(a_y=np.asarray(log["a_y"]) + 1.0 * late)
-    found = [share_of_prior(one) for one in logs]
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rear_axle_fit, "VARIED", 0.0)
+        found = [share_of_prior(one) for one in logs]
         patch.setattr(rear_axle_fit, "disagreement", lambda *fits: 1.0)
         return *found, *(share_of_prior(one) for one in logs)
 

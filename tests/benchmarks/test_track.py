@@ -1,0 +1,38 @@
+"""The test track drives every manoeuvre that turns."""
+
+import pytest
+from benchmarks.accuracy.__main__ import ITSELF
+from benchmarks.accuracy.logs import settings
+from benchmarks.accuracy.measure import measure
+from benchmarks.accuracy.report import COURSE_HEAD, show_courses, summary
+from benchmarks.accuracy.track import COURSES, STRAIGHT, track
+
+from jaxveh.manoeuvres import MANOEUVRES
+
+from test_accuracy_report import line
+
+
+def test_every_manoeuvre_that_turns_is_driven():
+    driven = {course.name for course in COURSES.values()}
+    assert driven.isdisjoint(STRAIGHT)
+    assert driven | set(STRAIGHT) == set(MANOEUVRES)
+
+
+def test_each_course_has_a_row_of_its_medians(capsys):
+    more = {"coverage_50": 0.5, "crps": 0.1, "crps_constant": 0.1}
+    about = summary([line(rmse=0.1, **more), line(rmse=0.3, **more), line(failed="too short")])
+    assert about.keys() >= set(COURSE_HEAD.values())
+    show_courses({"ramp": about, "circle": {"runs": 1, "failed": 1}}, "track")
+    rows = [text for text in capsys.readouterr().out.splitlines() if "ramp" in text or "circle" in text]
+    # RMSE, open loop, their ratio and the worst, the ratio to the file's car and the worst, two coverages.
+    assert rows[0].split("│")[2:-1] == [f" {cell:>{len(old) - 2}} " for cell, old in zip(
+        ["3", "1", "0.20", "0.60", "0.33", "0.50", "0.67", "1.00", "0.95", "0.95"], rows[0].split("│")[2:-1], strict=True)]  # fmt: skip
+    assert rows[1].split("│")[2].strip() == "1"
+
+
+@pytest.mark.seldom
+def test_a_circle_that_calibrates_itself_stays_with_the_file_s_car():
+    """Eleven times the error of the file's car, when every row counted."""
+    logs = [one.log for one in track(8, 5, "circle")]
+    found = summary([measure(log, next(one for one in settings(log) if one.name == ITSELF)) for log in logs])
+    assert found["failed"] == 0 and found["over_as_told_worst"] < 1.3 and found["coverage_95"] > 0.92
