@@ -1,7 +1,8 @@
 """`python -m benchmarks.accuracy [--only TEXT] [--no-logs] [--no-fleet] [--no-track] [--runs N] [--seed N] [--json FILE]`.
 
 Estimates sideslip on every shared log in every setting, on a fleet of simulated cars, and on their test-track drives, next to the
-open-loop linear model and to the values of the car file. Every estimate is blind except those "with v_y", whose calibration span has the reference. Rows
+open-loop linear model and to the values of the car file. Every estimate is blind except those "with v_y", whose calibration span
+has the reference. Rows
 below 3 m/s are not scored (0.5 for cars shorter than a metre).
 """
 
@@ -102,7 +103,9 @@ def _track(only: str, drives: int, seed: int) -> dict:
             lines = _measured([one.log for one in track(drives, seed, name)], ITSELF)
             found[name] = {"summary": summary(lines), "lines": [line.numbers() for line in lines]}
     if found:
-        show_courses({name: one["summary"] for name, one in found.items()}, f"track, {ITSELF}: {drives} drives of each course")
+        show_courses(
+            {name: one["summary"] for name, one in found.items()}, f"track, {ITSELF}: {drives} drives of each course"
+        )
     return found
 
 

@@ -6,7 +6,8 @@ be led astray.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import jax
@@ -32,13 +33,13 @@ LEAST = 5.5
 
 
 class Course(NamedTuple):
-    """How a manoeuvre is driven: its `name` in `MANOEUVRES`, `speed` (m/s), steer as that of a steady turn that uses this `share` of
-    the grip (-), and its `options`."""
+    """How a manoeuvre is driven: its `name` in `MANOEUVRES`, `speed` (m/s), steer as that of a steady turn that uses this `share`
+    of the grip (-), and its `options`."""
 
     name: str
     speed: float
     share: float = 0.0
-    options: dict[str, Any] = {}
+    options: Mapping[str, Any] = MappingProxyType({})
 
 
 COURSES = {
@@ -84,7 +85,9 @@ def _course(name: str, runs: int, rng: np.random.Generator) -> Iterator[TrackLog
     numbers = cars()
     names = [list(numbers)[i % len(numbers)] for i in range(runs)]
     drawn = [_draw(numbers[car], COURSES[name], i, rng) for i, car in enumerate(names)]
-    stacked = jax.tree.map(lambda *leaves: jnp.stack([jnp.asarray(leaf) for leaf in leaves]), *[one.run for one in drawn])
+    stacked = jax.tree.map(
+        lambda *leaves: jnp.stack([jnp.asarray(leaf) for leaf in leaves]), *[one.run for one in drawn]
+    )
     said, truth = (jax.tree.map(np.asarray, one) for one in simulated(stacked))
     for i, (car, one) in enumerate(zip(names, drawn, strict=True)):
         channels = delayed({channel: values[i] for channel, values in said.items()}, rng)

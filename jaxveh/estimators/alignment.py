@@ -18,8 +18,8 @@ USUAL, SOFTER = 0.12, 0.7
 0.09 s were found (tyres near their limit). For a car that was not fitted, `SOFTER` times its own lag is added: a softer axle
 looks alike."""
 
-ALIKE, UNSURE = 0.85, 0.03
-"""Correlation below which no delay is estimated, and the standard error (s) above which none is: a slow ramp of steer and a circle
+ALIKE, VAGUE = 0.85, 0.03
+"""Correlation below which no delay is estimated, and standard error (s) above which none is: a slow ramp of steer and a circle
 look the same whenever they are measured."""
 
 
@@ -43,7 +43,7 @@ def a_y_delay(fitted: CarSpecification, told: CarSpecification, recordings: Sequ
 def _found(car: CarSpecification, recordings: Sequence[Recording]) -> tuple[float, float]:
     """The delay of a_y against the yaw rate by the car's model, and its standard error (s); (0, 0) where it cannot be timed."""
     found = [diagnostics.a_y_delay(one, car) for one in recordings]
-    sure = [one for one in found if one is not None and one.correlation > ALIKE and one.error < UNSURE]
+    sure = [one for one in found if one is not None and one.correlation > ALIKE and one.error < VAGUE]
     if not sure:
         return 0.0, 0.0
     weights = np.array([1 / max(one.error, 1e-3) ** 2 for one in sure])

@@ -53,11 +53,11 @@ prior of 0.006 rad for `slip_error`):
 | 24 simulated drives (passenger car, SUV, ev), mean | 0.079 (0.091) | 0.080 (0.096) | 0.081 (0.104) |"""
 
 VARIED, POWER, MOST = 6.0, 3.0, 100.0
-"""A log whose `variety` is below `VARIED` counts `(VARIED / variety)^POWER` times less against the prior, at most `MOST` times: on a
-ramp of steer, a circle or a slalom, gain and stiffness stand for each other, and what the equations lack (the phase of a body that
-rolls) has the frequency of what they say, so that noises are found too small and rows count too much. Error over that of the car's
-file without a calibration (geometric mean), and the share of rows in the 95 % band, of 12 simulated drives each (14 degrees of
-freedom), on which this was chosen:
+"""A log whose `variety` is below `VARIED` counts `(VARIED / variety)^POWER` times less against the prior, at most `MOST` times.
+On a ramp of steer, a circle or a slalom, gain and stiffness stand for each other, and what the equations lack (the phase of a
+body that rolls) has the frequency of what they say, so that noises are found too small and rows count too much. Error over that
+of the car's file without a calibration (geometric mean), and the share of rows in the 95 % band, of 12 simulated drives each (14
+degrees of freedom), on which this was chosen:
 
 | | counted whole | `VARIED` 6 |
 | --- | --- | --- |
@@ -65,9 +65,9 @@ freedom), on which this was chosen:
 | slalom of 0.5 Hz; of 0.2 Hz | 1.0, 71 %; 0.8, 90 % | 0.9, 96 %; 0.7, 100 % |
 | slalom between cones | 0.56, 99 % | 0.42, 100 % |
 
-With 8, the slalom has 0.9 (100 %), and the Genesis calibrated on its first 60 s 0.571 instead of 0.560 degrees. Swept sines, random
-steering, every drive of a fleet of 24 and logs of a minute or more have 6 or more, short pieces of logs 3 to 7. All logs counted
-eight times less made the fleet's errors half as large again."""
+With 8, the slalom has 0.9 (100 %), and the Genesis calibrated on its first 60 s 0.571 instead of 0.560 degrees. Swept sines,
+random steering, every drive of a fleet of 24 and logs of a minute or more have 6 or more, short pieces of logs 3 to 7. All logs
+counted eight times less made the fleet's errors half as large again."""
 
 UNSURE = 1e-3
 """A variance of the fit may be this share above the prior's; what is more is lost in rounding."""

@@ -81,7 +81,9 @@ def slalom():
     """A car that leans, at one frequency: its a_y is 15 % larger than the file's, and comes 8 ms late."""
     time, rng = np.arange(2400) * 0.01, np.random.default_rng(4)
     v_x, steer = np.full(len(time), 20.0), 0.03 * np.sin(2 * np.pi * 0.5 * time)
-    truth = estimators.open_loop(vehicles.from_specification(test_sideslip.CAR), Recording(time, {"steer": steer, "v_x": v_x}))
+    truth = estimators.open_loop(
+        vehicles.from_specification(test_sideslip.CAR), Recording(time, {"steer": steer, "v_x": v_x})
+    )
     a_y = np.interp(time - 0.008, time, np.gradient(truth["v_y"], time) + v_x * truth["yaw_rate"])
     return Recording(
         time,
