@@ -28,6 +28,8 @@ def variety(logs: Sequence[Recording]) -> float:
 
 
 def _of_one(a_y: np.ndarray) -> float:
+    if not a_y.size:
+        return 0.0
     # Mirrored at its end, as for a cosine transform: a jump from the last value to the first would look varied.
     ring = np.concatenate([a_y, a_y[::-1]]) - a_y.mean()
     energy = np.maximum(np.abs(np.fft.rfft(ring)) ** 2 - len(ring) * QUIET**2, 0.0)

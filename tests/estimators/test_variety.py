@@ -43,6 +43,7 @@ def test_logs_add_and_rows_that_do_not_count_are_left_out():
     assert variety([coarse(one), coarse(other)]) == pytest.approx(sum(both))
     more = np.concatenate([one, np.random.default_rng(0).normal(size=80)])
     assert variety([coarse(more, np.arange(len(more)) < ROWS)]) == pytest.approx(both[0])
+    assert variety([coarse(one), coarse(other, np.zeros(ROWS, bool))]) == pytest.approx(both[0])
 
 
 def test_standing_still_or_noise_alone_has_none():
