@@ -142,6 +142,12 @@ def untold_in_words(calibration: Calibration) -> str | None:
     names = [estimators.kit.in_words(name) for name in sideslip.little_told(calibration)]
     if not names:
         return None
+    # A blind fit knows nothing of the reference's angle, which `little_told` leaves out.
+    if len(names) >= len(calibration.fit.chosen) - 1:
+        return (
+            "The logs contain too little information for a calibration: all values are hardly known better than from the car's "
+            "file. Calibrate on a drive through bends of different length and sharpness."
+        )
     return f"The logs contain little information about {', '.join(names)}; the bands allow for it."
 
 

@@ -14,6 +14,7 @@ from shared_data import shared
 
 from jaxveh import InputError, Recording, estimators, filters, io, sensors, vehicles
 from jaxveh._core.parameter import pick
+from jaxveh.cli.sideslip import untold_in_words
 from jaxveh.estimators import parameter_bands
 from jaxveh.estimators.cleaning import FORCE_CUTOFF
 from jaxveh.estimators.rear_axle_prior import car_of
@@ -301,6 +302,15 @@ def test_a_calibration_finds_stiffnesses_that_the_file_does_not_know():
     told, found = (estimators.sideslip.estimate(one, log().without("v_y")) for one in (CAR_TOLD, calibrated()))
     errors = [estimators.sideslip.score(CAR, one, log())["sideslip_rmse_deg"] for one in (told, found)]
     assert errors[1] < 0.5 * errors[0]
+
+
+def test_a_log_that_tells_nothing_is_said_to_in_one_sentence():
+    of = lambda size: dataclasses.replace(
+        calibrated(), fit=dataclasses.replace(calibrated().fit, covariance=size * calibrated().fit.covariance)
+    )
+    assert untold_in_words(of(1e-6)) is None
+    assert "little information about" in untold_in_words(calibrated())
+    assert "too little information for a calibration" in untold_in_words(of(1e6))
 
 
 def test_what_a_log_hardly_tells_is_named():
