@@ -217,7 +217,7 @@ def simulated(run: Run) -> tuple[dict, dict]:
     truth = {name: drive[f"true.{name}"] for name in (*SEEN, *POSES)}
     said = {}
     for device in _devices(run.biases):
-        said |= device.read(DT * jnp.arange(len(drive)), truth, run.key)
+        said |= device.read(DT * jnp.arange(float(len(drive))), truth, run.key)
     said["v_x"] = truth["v_x"] * (1 + run.biases["v_x"])
     return said, {name: truth[name] for name in ("v_y", "yaw_rate")}
 
