@@ -2,8 +2,7 @@
 
 Estimates sideslip on every shared log in every setting, on a fleet of simulated cars, and on their test-track drives, next to the
 open-loop linear model and to the values of the car file. Every estimate is blind except those "with v_y", whose calibration span
-has the reference. Rows
-below 3 m/s are not scored (0.5 for cars shorter than a metre).
+has the reference. Rows below 3 m/s are not scored (0.5 for cars shorter than a metre).
 """
 
 from __future__ import annotations
@@ -100,7 +99,7 @@ def _track(only: str, drives: int, seed: int) -> dict:
     found = {}
     for name in COURSES:
         if only in f"track, {name}":
-            lines = _measured([one.log for one in track(drives, seed, name)], ITSELF)
+            lines = _measured(list(track(name, drives, seed)), ITSELF)
             found[name] = {"summary": summary(lines), "lines": [line.numbers() for line in lines]}
     if found:
         show_courses(

@@ -131,11 +131,11 @@ def fleet(runs: int, seed: int = 0, duration: float = 90.0) -> list[FleetLog]:
     stacked = jax.tree.map(
         lambda *leaves: jnp.stack([jnp.asarray(leaf) for leaf in leaves]), *[run for run, _ in drawn]
     )
-    said, truth = simulated(stacked)
+    said, truth = simulate_runs(stacked)
     said, truth = (jax.tree.map(np.asarray, one) for one in (said, truth))
     found = []
     for i, ((car, drive), (run, told)) in enumerate(zip(plans, drawn, strict=True)):
-        channels = delayed({name: values[i] for name, values in said.items()}, rng)
+        channels = shift_steer({name: values[i] for name, values in said.items()}, rng)
         v_y = truth["v_y"][i] + told.cg_error * truth["yaw_rate"][i]
         recording = Recording(DT * np.arange(len(v_y)), {**channels, "v_y": v_y}, source=f"fleet {i}")
         kept = _until_lost(recording)
@@ -184,15 +184,15 @@ def _draw(numbers: vehicles.CarNumbers, drive: Drive, rng: np.random.Generator, 
         car.mass,
         wheel_radius=numbers.wheel_radius,
     )
-    return Run(car, road, driver, biases(rng), own), told(numbers, rng, roughness)
+    return Run(car, road, driver, draw_biases(rng), own), draw_file(numbers, rng, roughness)
 
 
-def biases(rng: np.random.Generator) -> dict[str, float]:
+def draw_biases(rng: np.random.Generator) -> dict[str, float]:
     """Draw the constant errors of the sensors."""
     return {name: std * rng.normal() for name, std in BIASES.items()}
 
 
-def told(numbers: vehicles.CarNumbers, rng: np.random.Generator, roughness: float) -> Told:
+def draw_file(numbers: vehicles.CarNumbers, rng: np.random.Generator, roughness: float) -> Told:
     """Draw the errors of a car file."""
     factor = lambda name: float(np.exp(SPREADS[name] * rng.normal()))
     stiffness = lambda tyre: 2.0 * tyre.cornering_stiffness * float(np.exp(rng.uniform(*np.log(STIFFNESS))))
@@ -211,7 +211,7 @@ POSES = ("roll", "pitch", "roll_rate", "pitch_rate", "roll_acceleration", "pitch
 
 @eqx.filter_jit
 @eqx.filter_vmap
-def simulated(run: Run) -> tuple[dict, dict]:
+def simulate_runs(run: Run) -> tuple[dict, dict]:
     """Return the measurements and the truth of a batch of runs."""
     drive = simulate(run.car, run.driver, road=run.road, dt=DT, max_step=MAX_STEP, solver="explicit", throw=False)
     truth = {name: drive[f"true.{name}"] for name in (*SEEN, *POSES)}
@@ -238,7 +238,7 @@ def _devices(biases: dict) -> tuple:
     return imu, sensors.SteeringAngle(steer, backlash=degree / 16, rate=1 / DT)
 
 
-def delayed(channels: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
+def shift_steer(channels: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
     """Delay the steer by up to `LATEST` rows relative to all other channels, or make it early by as much."""
     rows = int(rng.integers(-LATEST, LATEST + 1))
     at = np.clip(np.arange(len(channels["steer"])) - rows, 0, len(channels["steer"]) - 1)

@@ -16,7 +16,7 @@ import numpy as np
 
 from jaxveh import Recording, manoeuvres, roads, vehicles
 
-from .fleet import DT, SHORTEST_WAVE, WAVES, Run, biases, cars, delayed, simulated, told
+from .fleet import DT, SHORTEST_WAVE, WAVES, Run, Told, cars, draw_biases, draw_file, shift_steer, simulate_runs
 from .logs import Log
 
 STRAIGHT = {"mu-jump-braking": "it goes straight ahead", "cruise": "it goes straight ahead"}
@@ -25,8 +25,8 @@ STRAIGHT = {"mu-jump-braking": "it goes straight ahead", "cruise": "it goes stra
 FRICTION, ROUGHNESS, BANK = (0.75, 1.0), (4e-6, 32e-6), 0.015
 """Range of the track's friction and unevenness (m^3), and standard deviation of its bank (rad) in every other drive."""
 
-SPUN = np.radians(60.0)
-"""Sideslip at which a log ends, rad."""
+SPUN, SLOWEST = np.radians(60.0), 2.0
+"""Sideslip (rad) from which on, and speed (m/s) up to which, a car is not driven any more: its log ends."""
 
 LEAST = 5.5
 """Shortest log, s."""
@@ -61,48 +61,32 @@ COURSES = {
 """Every manoeuvre that turns, by a name of its own."""
 
 
-class TrackLog(NamedTuple):
-    """A `Log` of the track, and hidden values: the course, the car's name, the road's friction."""
-
-    log: Log
-    course: str
-    car: str
-    friction: float
-
-
-def track(runs: int, seed: int = 0, only: str = "") -> Iterator[TrackLog]:
-    """Yield the logs of `runs` drives of each course whose name contains `only`, with every car in turn; each course is simulated
-    by one program.
+def track(course: str, runs: int, seed: int = 0) -> Iterator[Log]:
+    """Yield the logs of `runs` drives of one of the `COURSES`, with every car in turn, simulated by one program.
 
     A drive ends when its car has `SPUN` or stands, and is left out if that is sooner than `LEAST`.
     """
-    for place, name in enumerate(COURSES):
-        if only in name:
-            yield from _course(name, runs, np.random.default_rng([seed, place]))
-
-
-def _course(name: str, runs: int, rng: np.random.Generator) -> Iterator[TrackLog]:
-    numbers = cars()
+    rng, numbers = np.random.default_rng([seed, list(COURSES).index(course)]), cars()
     names = [list(numbers)[i % len(numbers)] for i in range(runs)]
-    drawn = [_draw(numbers[car], COURSES[name], i, rng) for i, car in enumerate(names)]
+    drawn = [_draw(numbers[car], COURSES[course], i, rng) for i, car in enumerate(names)]
     stacked = jax.tree.map(
         lambda *leaves: jnp.stack([jnp.asarray(leaf) for leaf in leaves]), *[one.run for one in drawn]
     )
-    said, truth = (jax.tree.map(np.asarray, one) for one in simulated(stacked))
+    said, truth = (jax.tree.map(np.asarray, one) for one in simulate_runs(stacked))
     for i, (car, one) in enumerate(zip(names, drawn, strict=True)):
-        channels = delayed({channel: values[i] for channel, values in said.items()}, rng)
-        v_y = truth["v_y"][i] + one.file.cg_error * truth["yaw_rate"][i]
-        recording = Recording(DT * np.arange(len(v_y)), {**channels, "v_y": v_y}, source=f"{name} {i}")
-        spun = np.flatnonzero((np.abs(np.arctan2(v_y, channels["v_x"])) > SPUN) | (channels["v_x"] < 2.0))
-        kept = recording.rows(slice(0, spun[0] if spun.size else len(recording)))
+        channels = shift_steer({channel: values[i] for channel, values in said.items()}, rng)
+        # The reference is the truth at the centre of gravity of the car file.
+        v_y = truth["v_y"][i] + one.told.cg_error * truth["yaw_rate"][i]
+        recording = Recording(DT * np.arange(len(v_y)), {**channels, "v_y": v_y}, source=f"{course} {i}")
+        driven = (np.abs(np.arctan2(v_y, channels["v_x"])) < SPUN) & (channels["v_x"] > SLOWEST)
+        kept = recording.rows(slice(0, len(recording) if driven.all() else int(np.argmin(driven))))
         if len(kept) * DT >= LEAST:
-            yield TrackLog(Log(f"{name} {i}: {car}", one.file.file, kept), name, car, one.friction)
+            yield Log(f"{course} {i}: {car}", one.told.file, kept)
 
 
 class _Drawn(NamedTuple):
     run: Run
-    file: Any
-    friction: float
+    told: Told
 
 
 def _draw(numbers: vehicles.CarNumbers, course: Course, i: int, rng: np.random.Generator) -> _Drawn:
@@ -113,7 +97,7 @@ def _draw(numbers: vehicles.CarNumbers, course: Course, i: int, rng: np.random.G
     steer = _steer(numbers, course.speed, course.share * friction * _grip(numbers) * vehicles.GRAVITY)
     driver = manoeuvres.named_manoeuvre(course.name, course.speed, steer, steering, **course.options)
     car = vehicles.build(numbers, vehicles.FourteenDOF)
-    return _Drawn(Run(car, road, driver, biases(rng), own), told(numbers, rng, roughness), friction)
+    return _Drawn(Run(car, road, driver, draw_biases(rng), own), draw_file(numbers, rng, roughness))
 
 
 def _grip(numbers: vehicles.CarNumbers) -> float:

@@ -10,7 +10,9 @@ from jaxveh._core.errors import warn
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import kit as diagnostics
 from jaxveh.estimators.cleaning import without_wild_values
+from jaxveh.estimators.coarse_log import coarse_logs
 from jaxveh.estimators.rear_axle import RearAxle
+from jaxveh.estimators.variety import QUIET, variety
 from jaxveh.io import CarSpecification
 
 USUAL, SOFTER = 0.12, 0.7
@@ -18,9 +20,12 @@ USUAL, SOFTER = 0.12, 0.7
 0.09 s were found (tyres near their limit). For a car that was not fitted, `SOFTER` times its own lag is added: a softer axle
 looks alike."""
 
-ALIKE, VAGUE = 0.85, 0.03
-"""Correlation below which no delay is estimated, and standard error (s) above which none is: a slow ramp of steer and a circle
-look the same whenever they are measured."""
+ALIKE = 0.85
+"""Correlation below which no delay is estimated."""
+
+SURE, WINDOW = 3.0, 0.2
+"""A delay must change a_y, in means over `WINDOW` s, by more than `SURE` times what roads and offsets do (`variety.QUIET`) over
+the root of the log's `variety`: on slow ramps of steer and circles, slow errors of a_y look like delays of 0.1 to 0.5 s."""
 
 
 def a_y_delay(fitted: CarSpecification, told: CarSpecification, recordings: Sequence[Recording]) -> float:
@@ -34,7 +39,7 @@ def a_y_delay(fitted: CarSpecification, told: CarSpecification, recordings: Sequ
     for car, softer in ((fitted, 0.0), (told, SOFTER)):
         usual = USUAL + softer * max(_lag(car, one) for one in recordings)
         seconds, error = _found(car, recordings)
-        if abs(seconds) > usual + 3 * error:
+        if abs(seconds) > usual + 3 * error and _is_felt(recordings, seconds, told.wheelbase):
             _warn(seconds, error)
             return seconds
     return 0.0
@@ -43,11 +48,29 @@ def a_y_delay(fitted: CarSpecification, told: CarSpecification, recordings: Sequ
 def _found(car: CarSpecification, recordings: Sequence[Recording]) -> tuple[float, float]:
     """The delay of a_y against the yaw rate by the car's model, and its standard error (s); (0, 0) where it cannot be timed."""
     found = [diagnostics.a_y_delay(one, car) for one in recordings]
-    sure = [one for one in found if one is not None and one.correlation > ALIKE and one.error < VAGUE]
+    sure = [one for one in found if one is not None and one.correlation > ALIKE and np.isfinite(one.error)]
     if not sure:
         return 0.0, 0.0
     weights = np.array([1 / max(one.error, 1e-3) ** 2 for one in sure])
     return float(np.average([one.seconds for one in sure], weights=weights)), float(weights.sum() ** -0.5)
+
+
+def _is_felt(recordings: Sequence[Recording], seconds: float, wheelbase: float) -> bool:
+    """Whether these logs tell a delay from slow errors of a_y."""
+    change = np.concatenate([_change(one, seconds) for one in recordings])
+    size = np.sqrt(np.mean(change**2)) if change.size else 0.0
+    return bool(size * variety(coarse_logs(recordings, wheelbase)) ** 0.5 > SURE * QUIET)
+
+
+def _change(recording: Recording, seconds: float) -> np.ndarray:
+    """By how much v_x yaw_rate changes within these seconds, m/s^2, in means over `WINDOW`."""
+    turning = np.asarray(recording["v_x"], float) * np.asarray(recording["yaw_rate"], float)
+    known = np.isfinite(turning)
+    time, turning = np.asarray(recording.time, float)[known], turning[known]
+    integral = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(time) * (turning[1:] + turning[:-1]))])
+    mean = lambda at: np.diff(np.interp([at - WINDOW / 2, at + WINDOW / 2], time, integral), axis=0)[0] / WINDOW
+    inner = time[(time > time[0] + WINDOW + abs(seconds)) & (time < time[-1] - WINDOW - abs(seconds))]
+    return mean(inner) - mean(inner - seconds)
 
 
 def _lag(car: CarSpecification, recording: Recording) -> float:

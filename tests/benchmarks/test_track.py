@@ -30,9 +30,8 @@ def test_each_course_has_a_row_of_its_medians(capsys):
 
 
 @pytest.mark.seldom
-@pytest.mark.filterwarnings("ignore:sideslip. a_y comes")  # on one circle, where the car slides
 def test_a_circle_that_calibrates_itself_stays_with_the_file_s_car():
     """Eleven times the error of the file's car, when every row counted."""
-    logs = [one.log for one in track(8, 5, "circle")]
+    logs = track("circle", 8, seed=5)
     found = summary([measure(log, next(one for one in settings(log) if one.name == ITSELF)) for log in logs])
     assert found["failed"] == 0 and found["over_as_told_worst"] < 1.3 and found["coverage_95"] > 0.92
