@@ -14,7 +14,7 @@ import hypothesis
 import jax
 import pytest
 from hypothesis import strategies
-from time_budget import keep_one_colour, keep_part, keep_to_budget, record_seconds
+from time_budget import keep_one_colour, keep_part, keep_to_budget, mark_rare, record_seconds
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
@@ -24,7 +24,7 @@ OLDER_GENERATOR = "--xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codege
 QUICKLY_COMPILED = {"0.10.": f"{UNOPTIMISED} {OLDER_GENERATOR}", "0.11.": UNOPTIMISED, "0.12.": UNOPTIMISED}
 """Flags that a version of jaxlib is known to have, by how its number begins: an unknown flag ends the process."""
 
-QUICK_RUNS = ("not full", "peers", "studies", "thorough", "seldom")
+QUICK_RUNS = ("not full", "peers", "studies", "thorough", "seldom", "rare")
 """How the expressions of `-m` begin whose runs are compiled quickly; the first is the default's (`addopts`)."""
 
 KEPT_AT_MOST = 2e9
@@ -64,10 +64,12 @@ def keep_programs(config):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
+    part = int(os.environ["JAXVEH_PART"]) if "JAXVEH_PART" in os.environ else None
+    mark_rare(items, part)
     keep_one_colour(items)
     keep_to_budget(items)
-    if "JAXVEH_PART" in os.environ:
-        keep_part(items, int(os.environ["JAXVEH_PART"]))
+    if part is not None:
+        keep_part(items, part)
 
 
 def pytest_collection_finish():

@@ -11,9 +11,11 @@ marked `whole`: each of its cases is the only one that looks at a member's numbe
 
 `JAXVEH_SECONDS=1 python -m pytest` records them again.
 
-`JAXVEH_PART=0` to `19` leaves four fifths of what is `thorough` or of the `studies`, and 19 twentieths of what is `seldom`, to
-`-m full`. `.ci/run` takes the part that the commit decides, so that changes in a row run all of them, and the same commit always
-the same: all of them at once would take it two hours. Without it all run.
+What is marked `full` by hand takes minutes. One case of each such function is `rare`, so that each is run by somebody.
+
+`JAXVEH_PART=0` to `99` leaves four fifths of what is `thorough` or of the `studies`, 19 twentieths of what is `seldom`, and 99
+hundredths of what is `rare`, to `-m full`. `.ci/run` takes the part that the commit decides, so that changes in a row run all of
+them, and the same commit always the same: all of them at once would take it hours. Without it all run.
 """
 
 import json
@@ -43,7 +45,13 @@ ALWAYS = ("site/test_notebooks.py", "test_a_page_runs_from_top_to_bottom[README.
 PARTS = {"thorough": 5, "studies": 5, "seldom": 20}
 """Of what bears the mark `.ci/run` runs one in so many."""
 
-LEFT_OUT = ("full", "peers", "site", *PARTS)
+RARE = 100
+"""Of what is marked `full` by hand `.ci/run` runs one function in so many."""
+
+ELSEWHERE = ("peers", "site")
+"""Marks of tests with an environment of their own."""
+
+LEFT_OUT = ("full", *ELSEWHERE, *PARTS)
 """Marks of tests that do not run by default whatever they take. What no other test executes is marked `thorough` by hand,
 whatever it takes."""
 
@@ -51,6 +59,19 @@ whatever it takes."""
 def function_of(nodeid):
     """`filters/test_x.py::test_some_property` of `tests/filters/test_x.py::test_some_property[a-b]`."""
     return nodeid.partition("[")[0].removeprefix("tests/")
+
+
+def mark_rare(items, part=None):
+    """Mark as `rare` one case of each function with cases that are marked `full` by hand, of all such functions or of those of a
+    part. Comes before what marks others."""
+    functions = {}
+    for item in items:
+        if item.get_closest_marker("full") and not any(item.get_closest_marker(mark) for mark in ELSEWHERE):
+            functions.setdefault(function_of(item.nodeid), []).append(item)
+    for name, members in functions.items():
+        own = zlib.crc32(name.encode())
+        if part is None or own % RARE == part % RARE:
+            members[own % len(members)].add_marker(pytest.mark.rare)
 
 
 def keep_one_colour(items):
@@ -109,7 +130,7 @@ def mark_long(functions):
 
 
 def keep_part(items, part):
-    """Mark as `full` those long tests that are not of this part, 0 to 19: of pages each by itself, of other files each function
+    """Mark as `full` those long tests that are not of this part, 0 to 99: of pages each by itself, of other files each function
     with all its cases, which share what they compile. Whatever stands beside a test, it is of the same part."""
     for item in items:
         if any(name in item.nodeid for name in ALWAYS):

@@ -77,6 +77,24 @@ def test_all_parts_are_all_long_tests_and_share_only_what_a_user_meets_first(mar
     assert sum(map(len, functions)) == 60
 
 
+def test_each_function_that_is_marked_by_hand_has_a_case_in_one_part_of_a_hundred():
+    by_hand = lambda: [Long(f"tests/a.py::f{k}[{case}]", "full") for k in range(60) for case in range(3)]
+    plain = [Item("tests/a.py::quick"), Long("tests/a.py::page", "site"), Long("tests/a.py::slow", "thorough")]
+    time_budget.mark_rare(plain)
+    assert not any(item.marks for item in plain)
+    every = by_hand()
+    time_budget.mark_rare(every)
+    rare = lambda items: {item.nodeid for item in items if item.marks == ["rare"]}
+    assert sorted(function_of(name) for name in rare(every)) == sorted(f"a.py::f{k}" for k in range(60))
+    assert len({name.partition("[")[2] for name in rare(every)}) == 3
+    parts = []
+    for part in range(100):
+        items = by_hand()
+        time_budget.mark_rare(items, part)
+        parts.append(rare(items))
+    assert set().union(*parts) == rare(every) and sum(map(len, parts)) == 60
+
+
 def test_a_file_alone_runs_the_cases_that_it_runs_among_all(tmp_path, monkeypatch):
     monkeypatch.setattr(time_budget, "RECORD", tmp_path / "seconds.json")
     monkeypatch.setattr(time_budget, "LONG_BUDGET", 100.0)

@@ -38,7 +38,8 @@ EXEMPT = {
 }
 ELSEWHERE = {
     "JAXVEH_SHARED": "a variable of the environment", "JAXVEH_CACHE": "a variable of the environment",
-    "peers": "a marker of tests", "thorough": "a marker of tests", "seldom": "a marker of tests", "open_zarr": "xarray's",
+    "peers": "a marker of tests", "thorough": "a marker of tests", "seldom": "a marker of tests", "rare": "a marker of tests",
+    "open_zarr": "xarray's",
     "log.ay": "a column of a file", "log.ay.Data": "a part of a file",
     "log.ay.Time": "a part of a file", "log.vx.Data": "a part of a file", "log.vx.Time": "a part of a file", "sh": "a language",
 }  # fmt: skip
