@@ -14,7 +14,7 @@ from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_from_zero, passing_speed
 from jaxveh.estimators.car_file import number_of, numbers_in
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.delays import satellite_lag
+from jaxveh.estimators.delays import satellite_lag, unit_delay
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractSmoothable, answer
 from jaxveh.estimators.misfit import Misfit, Roughness, learn_roughness, no_misfit, no_roughness
@@ -42,6 +42,13 @@ WIDEST = math.radians(1.0)
 LINEAR = 4.0
 """m/s^2: from about here a tyre's slip angle grows faster than its force, on a dry road."""
 
+ROLL_TIME = 0.02
+"""s: time constant of the low-pass of the roll acceleration, which is taken from the estimated roll rate: that of the springs'
+equation has the wrong phase near the body's own frequency."""
+
+LATENESS = 1.0
+"""-: standard deviation of what a delay of the inertial unit changes, over this change."""
+
 FALL = 4.0
 """How fast the weight of a slip angle falls beyond the gate: with 1 or 2 a sliding axle still turns into a bank."""
 
@@ -50,11 +57,13 @@ MORE = ("v_y", "rear_scale", "roll_scale", "a_y_bias", "yaw_rate_bias", "roll_ra
 
 
 class Memory(NamedTuple):
-    """The last measurements, the belief, and how far the car lately was from a steady turn (None: not checked); how noisy the
-    log is: the `misfit` of slip angle, course and roll rate, and the `roughness` of a_y and yaw rate."""
+    """The last measurements, the belief, the body's low-passed `roll_acceleration` (rad/s^2), and how far the car lately was from
+    a steady turn (None: not checked); how noisy the log is: the `misfit` of slip angle, course and roll rate, and the `roughness`
+    of a_y and yaw rate."""
 
     motion: Any
     belief: Belief
+    roll_acceleration: Any
     agreement: AgreementMemory | None
     misfit: Misfit
     roughness: tuple[Roughness, Roughness]
@@ -105,6 +114,7 @@ class Leaning(AbstractSmoothable):
     roll_rate_noise: jax.Array = positive("rad/s", default=0.006)
     across: jax.Array = positive("m/s", default=0.06)
     delay: jax.Array = parameter("s", scale=0.1, default=0.14)
+    unit_delay: jax.Array = parameter("s", scale=0.1, default=0.0)
     a_y_offset: jax.Array = parameter("m/s^2", scale=0.1, default=0.0)
     a_y_offset_spread: jax.Array = positive("m/s^2", default=0.09)
     gyro_offset_spread: jax.Array = positive("rad/s", default=math.radians(0.12))
@@ -127,7 +137,7 @@ class Leaning(AbstractSmoothable):
         agreement = None if self.steering is None else self.steering.start(t)
         belief, misfit = self._measured(belief, heard, agreement, no_misfit(3, t))
         rough = no_roughness(values["a_y"]), no_roughness(values["yaw_rate"])
-        memory = Memory(motion, belief, agreement, misfit, rough)
+        memory = Memory(motion, belief, jnp.zeros_like(t), agreement, misfit, rough)
         return memory, self.say(memory)
 
     def next(self, memory, t, values):
@@ -137,7 +147,9 @@ class Leaning(AbstractSmoothable):
         belief, misfit = self._measured(belief, heard, agreement, memory.misfit)
         said = zip(memory.roughness, (values["a_y"], values["yaw_rate"]), strict=True)
         rough = tuple(learn_roughness(one, value, heard["dt"]) for one, value in said)
-        memory = Memory(motion, belief, agreement, misfit, rough)
+        change = State(*belief.mean).body_roll_rate - State(*memory.belief.mean).body_roll_rate
+        acceleration = (ROLL_TIME * memory.roll_acceleration + change) / (ROLL_TIME + heard["dt"])
+        memory = Memory(motion, belief, acceleration, agreement, misfit, rough)
         return memory, self.say(memory)
 
     def ahead(self, memory, t, values):
@@ -235,16 +247,20 @@ class Leaning(AbstractSmoothable):
         motion, belief = memory.motion, memory.belief
         x = State(*belief.mean)
         forgets = passing_speed(motion.v_x) / self.bank_length
-        wide = lambda *names: spread_of(belief, dict.fromkeys(names, 1.0), State)
+        # The inertial unit is late: what has changed since.
+        angle, rate = self.unit_delay * x.body_roll_rate, self.unit_delay * memory.roll_acceleration
+        late = {"roll": angle, "body_roll": angle, "roll_rate": rate}
         said = {
             "bank": x.bank,
-            "roll": x.bank + x.body_roll,
-            "roll_rate": x.bank_rate - forgets * x.bank + x.body_roll_rate,
-            "body_roll": x.body_roll,
+            "roll": x.bank + x.body_roll + angle,
+            "roll_rate": x.bank_rate - forgets * x.bank + x.body_roll_rate + rate,
+            "body_roll": x.body_roll + angle,
             **{name: getattr(x, name) for name in MORE},
         }
         sums = {"roll": ("bank", "body_roll"), "roll_rate": ("bank_rate", "body_roll_rate")}
-        stds = {name: wide(*sums.get(name, (name,))) for name in said}
+        of_states = lambda name: spread_of(belief, dict.fromkeys(sums.get(name, (name,)), 1.0), State)
+        more = lambda name: jnp.square(LATENESS * late.get(name, 0.0))
+        stds = {name: numerics.sqrt(jnp.square(of_states(name)) + more(name)) for name in said}
         there = jnp.maximum(motion.silence, motion.speed_silence) < SILENCE
         widest = {"bank": WIDEST, "roll": WIDEST, "body_roll": WIDEST, "roll_rate": 6.0 * WIDEST}
         known = {name: there & (stds[name] < widest.get(name, jnp.inf)) for name in said}
@@ -262,5 +278,5 @@ def leaning_filter(car: CarSpecification, who: str, **options: Any) -> Leaning:
         roll_gradient=number_of(car, "roll_gradient", who, "rad/(m/s^2)"),
         delay=satellite_lag(car),
         **numbers_in(car, "roll_frequency", "roll_damping"),
-        **{"steering": agreement_of(car, who), **options},
+        **{"steering": agreement_of(car, who), "unit_delay": unit_delay(car), **options},
     )

@@ -1,7 +1,9 @@
 """Roll: each method where the right answer is known, and the filter on simulated cars."""
 
+import dataclasses
 import math
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from banked_drives import DEGREE, file_of, follow_all
@@ -10,6 +12,8 @@ from steady_logs import G, banked_circle, log
 from winding_roads import SCORED, heard_of
 
 from jaxveh.estimators import bank, grade, mass, roll
+from jaxveh.estimators.delays import unit_delay
+from jaxveh.estimators.leaning import leaning_filter
 
 
 def test_a_gyroscope_s_offset_is_found_and_its_roll_stays_the_accelerometer_s():
@@ -28,6 +32,28 @@ def test_a_gyroscope_follows_a_fast_roll():
     made = {"a_y": G * np.sin(angle), "yaw_rate": 0.0, "v_x": 20.0, "roll_rate": 0.15 * np.cos(3.0 * time), "a_x": 0.0}
     found = roll.estimate(method, log(method.needs, made, 3000))
     assert np.abs(found["roll"] - angle)[1000:].max() < 0.003
+
+
+@pytest.mark.parametrize("hertz", [0.3, 1.0, 2.0])
+def test_the_filter_s_roll_is_that_of_now_though_its_unit_is_late(hertz):
+    """A body swings on its springs on a level road: exact phasors, delayed."""
+    method, late = leaning_filter(CAR, "roll"), unit_delay(CAR)
+    method = dataclasses.replace(method, steering=None)
+    s, v_x, f_y = 2j * math.pi * hertz, 20.0, 2.0
+    w, damping = 2.0 * math.pi * float(method.roll_frequency), float(method.roll_damping)
+    angle = float(method.roll_gradient) * f_y * w * w / (w * w + 2.0 * damping * w * s + s * s)
+    c, b = float(method.rear_compliance), float(method.rear_axle_to_cg)
+    made = {"a_y": f_y + G * angle, "yaw_rate": f_y * (1.0 + s * v_x * c) / (v_x + s * b), "roll_rate": s * angle}
+    time = 0.01 * np.arange(2000)
+    swing = lambda phasor, t: np.real(phasor * np.exp(s * t))
+    heard = {name: swing(phasor, time - late) for name, phasor in made.items()} | {"v_x": v_x, "a_x": 0.0}
+    recording = log(method.needs, heard, len(time))
+    found = roll.estimate(method, recording)
+    before = roll.estimate(dataclasses.replace(method, unit_delay=jnp.zeros(())), recording)
+    for name, truth in (("roll", angle), ("roll_rate", s * angle)):
+        error = (np.asarray(found[name]) - swing(truth, time))[1000:]
+        assert error.std() < 0.45 * (np.asarray(before[name]) - swing(truth, time))[1000:].std()
+        assert error.std() < np.sqrt(np.mean(np.square(getattr(found.std, name)[1000:])))
 
 
 def test_the_suspension_s_roll_is_that_of_its_gradient_and_its_step_response_that_of_a_second_order():

@@ -280,8 +280,8 @@ def learner_of(car: CarSpecification, who: str) -> Learner:
     """Makes `Learner` from a car's file. **Raises** `InputError` for a file without stiffnesses, `steering_ratio` or
     `roll_gradient`."""
     return Learner(
-        # What the steer says is learned here, and not yet known.
-        leaning_filter(car, who, steering=None),
+        # What the steer says is learned here, and not yet known; the roll is compared with a_y, which is as late.
+        leaning_filter(car, who, steering=None, unit_delay=0.0),
         car.mass,
         car.yaw_inertia,
         car.front_axle_to_cg,
