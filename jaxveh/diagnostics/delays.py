@@ -54,7 +54,7 @@ def delay_of_rows(mean, truth, there, most: int):
     there = there & (rows >= most) & (rows < truth.shape[0] - most)
     count = jnp.sum(there).astype(mean.dtype)
     mean_of = lambda values: jnp.sum(jnp.where(there, values, 0.0)) / count
-    size, mean, truth = jnp.max(jnp.abs(truth)), mean - mean_of(mean), truth - mean_of(truth)
+    size, mean, truth = numerics.largest(jnp.abs(truth)), mean - mean_of(mean), truth - mean_of(truth)
 
     def left(shift):
         error = mean - jnp.roll(truth, shift)

@@ -9,6 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import away_from_zero
 from jaxveh.estimators.car_file import USUAL_ROLL_GRADIENT, numbers_in
@@ -91,7 +92,7 @@ class Sliding(eqx.Module):
         beyond = jnp.where(there, shares - mean - usual, 0.0)
         calm = jnp.max(jnp.abs(beyond)) < 2.0 * self.usual_along
         usual = usual + jnp.where(calm, heard["dt"] / (self.learning + heard["dt"]), 0.0) * beyond
-        return fast * jnp.max(jnp.maximum(jnp.abs(beyond) - self.usual_along, 0.0)), usual
+        return fast * jnp.maximum(numerics.largest(jnp.abs(beyond)) - self.usual_along, 0.0), usual
 
 
 def indications_of_sliding(car: CarSpecification) -> Sliding:

@@ -94,7 +94,7 @@ def transport_plan(cost: Any, log_weights: Any, epsilon: float, iterations: int)
     """
     n = cost.shape[0]
     uniform = -jnp.log(jnp.asarray(n, cost.dtype))
-    start = jnp.maximum(jnp.max(cost), epsilon)
+    start = jnp.maximum(numerics.largest(cost), epsilon)
     along = jnp.minimum(1.0, 2.0 * jnp.arange(iterations, dtype=cost.dtype) / iterations)
     falling = jnp.maximum(start * (epsilon / start) ** along, epsilon)
     further = jnp.where(along < 1.0, 1.0, RELAXATION)

@@ -106,7 +106,7 @@ def _step(at: Quadratic, moves, changes, damping, unit):
     curvature = with_secants(at.matrix, moves, changes)
     damped = curvature + damping * jnp.diag(jnp.diagonal(curvature))
     move = -jnp.linalg.lstsq(damped, at.gradient)[0]
-    return move * jnp.minimum(1.0, LONGEST_STEP / jnp.maximum(jnp.max(jnp.abs(move / unit)), 1e-12))
+    return move * jnp.minimum(1.0, LONGEST_STEP / jnp.maximum(numerics.largest(jnp.abs(move / unit)), 1e-12))
 
 
 def with_secants(curvature, moves, changes):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any, NamedTuple
 
@@ -196,9 +197,9 @@ def clearance(x: Any, y: Any, yaw: Any, width: Any, length: Any, course: Course,
             f"x, y and yaw have the shapes {x.shape}, {y.shape} and {yaw.shape}: must be one, (T,), T at least 1."
         )
     corners = _corners(x, y, yaw, width, length, centre)
-    margins = [jnp.min(_margin(corners, lane)) for lane in course.lanes]
+    margins = [numerics.smallest(_margin(corners, lane)) for lane in course.lanes]
     whole = (jnp.min(x) <= course.lanes[0].start) & (jnp.max(x) >= course.lanes[-1].end)
-    return jnp.where(whole, jnp.min(jnp.stack(margins)), -jnp.inf)
+    return jnp.where(whole, numerics.smallest(jnp.stack(margins)), -jnp.inf)
 
 
 def passes(x: Any, y: Any, yaw: Any, width: Any, length: Any, course: Course, centre: Any = 0.0) -> jax.Array:
@@ -223,7 +224,7 @@ def _margin(corners, lane: Lane):
             crosses = (x - limit) * (x_next - limit) < 0
             share = (limit - x) / numerics.or_one(x_next - x, crosses)
             margins.append(_within(y + share * (y_next - y), lane, crosses))
-    return jnp.min(jnp.stack(margins), axis=0)
+    return functools.reduce(jnp.minimum, margins)
 
 
 def _within(y, lane: Lane, counts):

@@ -9,6 +9,7 @@ from jaxveh.numerics.blocks import sum_in_blocks
 from jaxveh.numerics.by_batch import RUNS, by_batch
 from jaxveh.numerics.divisors import or_one
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
+from jaxveh.numerics.extremes import largest, smallest
 from jaxveh.numerics.fences import apart, fence, fence_blocks, fence_results
 from jaxveh.numerics.harmonics import band_harmonics, gauss_markov_harmonics, sum_of_harmonics
 from jaxveh.numerics.linear_algebra import (
@@ -63,6 +64,7 @@ __all__ = [
     "interpolate_linear",
     "interpolate_smooth",
     "inverse_psd",
+    "largest",
     "log",
     "log_det",
     "lower_factor",
@@ -82,6 +84,7 @@ __all__ = [
     "secant",
     "sigma_points",
     "sin",
+    "smallest",
     "smooth_bump",
     "smooth_clip",
     "smooth_ramp",

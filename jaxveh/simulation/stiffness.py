@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 
+from jaxveh import numerics
 from jaxveh._core.errors import check_kind
 from jaxveh.sensors import Instrumented
 from jaxveh.simulation.driven import Driven, DrivenState, dtype_of
@@ -103,10 +104,10 @@ def spectral_radius(matrix: jax.Array) -> jax.Array:
 
     def squared(power, _):
         power = power @ power
-        size = jnp.maximum(jnp.max(jnp.abs(power)), LEAST_SIZE)
+        size = jnp.maximum(numerics.largest(jnp.abs(power)), LEAST_SIZE)
         return power / size, jnp.log(size)
 
-    size = jnp.maximum(jnp.max(jnp.abs(matrix)), LEAST_SIZE)
+    size = jnp.maximum(numerics.largest(jnp.abs(matrix)), LEAST_SIZE)
     _, sizes = jax.lax.scan(squared, matrix / size, None, length=SQUARINGS)
     # The i-th size is part of every later power, twice of each in turn.
     return size * jnp.exp(jnp.sum(sizes * 2.0 ** -jnp.arange(1, SQUARINGS + 1, dtype=matrix.dtype)))

@@ -71,7 +71,7 @@ METRICS: dict[str, Metric] = {
         "otherwise the prior's mean",
     ),
     "bias": Metric(lambda e: _mean(e.error, e.counts), "=", "mean of the error"),
-    "worst": Metric(lambda e: jnp.max(jnp.where(e.counts, jnp.abs(e.error), 0.0)), "=", "largest absolute error"),
+    "worst": Metric(lambda e: numerics.largest(jnp.where(e.counts, jnp.abs(e.error), 0.0)), "=", "largest absolute error"),
     "final": Metric(lambda e: jnp.abs(e.error[-1]), "=", "absolute error in the last row"),
     "coverage_50": Metric(_coverage(bands.NORMAL_HALF), "-", "share of rows inside the central 50 % band"),
     "coverage_95": Metric(_coverage(bands.NORMAL_95), "-", "share of rows inside the central 95 % band"),

@@ -114,3 +114,30 @@ def test_the_tests_that_are_named_exist():
     reasons = [where for lines in PLACES.values() for where in lines.values()] + list(ROOMS.values())
     named = {where.split(",")[0] for where in reasons if where.startswith("tests/")}
     assert named and all((root / where).exists() for where in named)
+
+
+EXTREMES = {"max": "largest", "min": "smallest"}
+NOT_DIFFERENTIATED = {"statespace/cramer_rao.py": "slopes that are compared with one another"}
+
+
+def extremes_in(text):
+    """Lines of `jnp.max` and `jnp.min` whose derivative may be taken: not those that are compared, are whole numbers (`result`),
+    or have no derivative."""
+    tree = ast.parse(text)
+    above = {inner: outer for outer in ast.walk(tree) for inner in ast.iter_child_nodes(outer)}
+    for node in ast.walk(tree):
+        called = getattr(node, "func", None)
+        if isinstance(called, ast.Attribute) and called.attr in EXTREMES and getattr(called.value, "id", "") == "jnp":
+            outer = above[node]
+            codes = isinstance(node.args[0], ast.Attribute | ast.Name) and ast.unparse(node.args[0]).endswith("result")
+            stopped = "stop_gradient" in ast.unparse(outer).partition("(")[0]
+            if not (isinstance(outer, ast.Compare) or codes or stopped):
+                yield node.lineno
+
+
+def test_extremes_have_a_finite_derivative():
+    """That of `jnp.max` is NaN where the largest value is computed twice, with roundings that differ."""
+    assert list(extremes_in("jnp.max(x)\njnp.max(x) > 0\njax.lax.stop_gradient(jnp.max(x))\nf(jnp.min(x))")) == [1, 4]
+    root = Path(jaxveh.__file__).parent
+    where = {path.relative_to(root).as_posix(): [*extremes_in(path.read_text("utf-8"))] for path in root.rglob("*.py")}
+    assert {path for path, lines in where.items() if lines} == set(NOT_DIFFERENTIATED), f"use numerics: {EXTREMES}"

@@ -212,8 +212,9 @@ def test_float32_is_float32_throughout_and_near(quantity, name):
 @every
 def test_gradients_with_respect_to_its_numbers_and_its_rows_are_finite_and_right(quantity, name):
     module, method = QUANTITIES[quantity], made(quantity, name)
-    time, values = stacked({"gaps": method_logs.variants(method.needs)["gaps"]}, method.needs)
-    values = jax.tree.map(lambda leaf: leaf[0, :120], values)
+    logs = method_logs.variants(method.needs)
+    time, values = stacked({name: logs[name] for name in ("gaps", "standing")}, method.needs)
+    values = jax.tree.map(lambda leaf: leaf[:, :120], values)
     numbers, rest = eqx.partition(method, eqx.is_inexact_array)
 
     def total(numbers, values):
@@ -222,8 +223,8 @@ def test_gradients_with_respect_to_its_numbers_and_its_rows_are_finite_and_right
         return sum(jnp.mean(jnp.where(jnp.isfinite(one), one, 0.0) * jnp.cos(time[:120])) for one in shown)
 
     # One program for the slopes and for the differences: compiling takes longer than the slopes that nobody asks for.
-    with_slopes = jax.jit(jax.value_and_grad(total, argnums=(0, 1)))
-    here, slopes = with_slopes(numbers, values)
+    with_slopes = jax.jit(jax.vmap(jax.value_and_grad(total, argnums=(0, 1)), in_axes=(None, 0)))
+    (here, _), slopes = with_slopes(numbers, values)
     for slope in jax.tree.leaves(slopes):
         assert np.isfinite(slope).all()
     leaves, structure = jax.tree.flatten(numbers)
@@ -231,7 +232,7 @@ def test_gradients_with_respect_to_its_numbers_and_its_rows_are_finite_and_right
         # Of what draws, the value itself jumps where other particles are chosen.
         if leaf.ndim or np.isinf(leaf) or draws(method):
             continue
-        found = float(jax.tree.leaves(slopes[0])[k])
+        found = float(jax.tree.leaves(slopes[0])[k][0])
 
         def misses(share, k=k, leaf=leaf, found=found):
             """By how much the slope and a difference over this share of the number differ, over the tolerance."""
@@ -239,7 +240,7 @@ def test_gradients_with_respect_to_its_numbers_and_its_rows_are_finite_and_right
             ahead, behind = (
                 jax.tree.unflatten(structure, [*leaves[:k], leaf + d, *leaves[k + 1 :]]) for d in (step, -step)
             )
-            difference = float(with_slopes(ahead, values)[0] - with_slopes(behind, values)[0]) / (2.0 * step)
+            difference = float(with_slopes(ahead, values)[0][0] - with_slopes(behind, values)[0][0]) / (2.0 * step)
             # A total of thousands (kg m^2) has no more digits in its difference than this.
             rounding = 0.5 * np.finfo(float).eps * abs(float(here)) / step
             tolerance = 1e-4 * (abs(found) + 1e-2) + rounding + 2e-3 * abs(difference)

@@ -76,7 +76,7 @@ class WheelObserver(AbstractWheelMethod):
             lambda slip: self._forces(seen._replace(slip=slip), wheels, memory.friction), (seen.slip,), (ones,)
         )
         slips = seen.there & (jnp.abs(seen.slip) > LEAST_SLIP)
-        excited = jnp.max(jnp.where(slips, jnp.abs(force - seen.slip * stiff) / load, 0.0))
+        excited = numerics.largest(jnp.where(slips, jnp.abs(force - seen.slip * stiff) / load, 0.0))
         excitation = memory.excitation + share * (excited - memory.excitation)
         return ObserverMemory(wheels, observed, friction, excitation)
 

@@ -124,7 +124,7 @@ class Navigator(AbstractTwoAxles):
     @property
     def longest_lag(self) -> Any:
         """The longest lag, s."""
-        return jnp.max(jnp.stack(list(self.lags.values())))
+        return numerics.largest(jnp.stack(list(self.lags.values())))
 
     def forces(self, x, u) -> tuple[Any, Any]:
         """Forces on the car over its mass (m/s^2), forward and to the left: the measured accelerations less their biases, and

@@ -9,6 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.errors import check
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import UNNAMED, check_parameters, positive, table
@@ -204,7 +205,7 @@ class StateDependentGain(AbstractPlaced):
         telling = jnp.square(lever) + jnp.square(edge) + TINY
         share, product = jnp.square(lever) / telling, z[0] * z[1] / (F[0, 0] * F[1, 1] - F[0, 1] * lever)
         aside = (F[0, 0] + F[1, 1] * product - z[0] - z[1]) * lever / telling
-        turning = share * (1.0 - product) + (1.0 - share) * (1.0 - jnp.min(z) / F[1, 1])
+        turning = share * (1.0 - product) + (1.0 - share) * (1.0 - numerics.smallest(z) / F[1, 1])
         return jnp.stack([aside, turning])[:, None]
 
 

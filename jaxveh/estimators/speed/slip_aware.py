@@ -284,7 +284,7 @@ class SlipAware(AbstractMethod):
         white, slow = self._wheel_variances(memory, belief, said)
         slow = slow + jnp.square(at_limit)
         # Where one wheel locks or spins, the forces of the others are unknown.
-        slow = slow + jnp.square(self.spreads.other_slip * jnp.max(suspicion) * rolled)
+        slow = slow + jnp.square(self.spreads.other_slip * numerics.largest(suspicion) * rolled)
         variances = jnp.concatenate([white + slow, numerics.as_wide_as(white, slow)])
         both = innovations(belief, expect, jnp.tile(wheels, 2), variances)
         found, rolling = (Innovation(*[part[rows] for part in both]) for rows in (slice(0, 4), slice(4, 8)))

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
@@ -44,12 +45,12 @@ class Wheels(NamedTuple):
     @property
     def fastest(self) -> jax.Array:
         """Speed of the fastest wheel, m/s; 0 where no wheel has a recent measurement."""
-        return jnp.where(self.spoke, jnp.max(jnp.where(self.fresh, self.speed, -jnp.inf)), 0.0)
+        return jnp.where(self.spoke, numerics.largest(jnp.where(self.fresh, self.speed, -jnp.inf)), 0.0)
 
     @property
     def slowest(self) -> jax.Array:
         """Speed of the slowest wheel, m/s; 0 where no wheel has a recent measurement."""
-        return jnp.where(self.spoke, jnp.min(jnp.where(self.fresh, self.speed, jnp.inf)), 0.0)
+        return jnp.where(self.spoke, numerics.smallest(jnp.where(self.fresh, self.speed, jnp.inf)), 0.0)
 
     @property
     def mean(self) -> jax.Array:

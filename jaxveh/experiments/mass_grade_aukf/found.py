@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh.experiments.mass_grade_aukf.drives import Drive, times
 from jaxveh.experiments.mass_grade_aukf.settings import Study
 
@@ -34,7 +35,7 @@ def metrics(study: Study, found: Found, drive: Drive) -> dict[str, Any]:
     time = times(study, error.shape[0])
     # It settles after the last row outside.
     outside = (error > 0.03) | ~jnp.isfinite(error)
-    last = jnp.max(jnp.where(outside, time, -study.dt))
+    last = numerics.largest(jnp.where(outside, time, -study.dt))
     settled = jnp.where(outside[-1], jnp.inf, last + study.dt)
     wrong = jnp.rad2deg(found.grade - drive.true_grade)
     rms = lambda x, rows: jnp.sqrt(jnp.sum(jnp.where(rows, x**2, 0.0)) / jnp.sum(rows.astype(x.dtype)))

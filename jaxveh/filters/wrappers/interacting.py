@@ -147,7 +147,7 @@ class InteractingModels(AbstractWrapper):
         beliefs, every_info = zip(*found, strict=True)
         logs = jnp.stack([info.log_likelihood for info in every_info])
         logs = jnp.where(before > 0, logs, -jnp.inf)
-        top = jnp.max(logs)
+        top = numerics.largest(logs)
         weights = before * jnp.exp(logs - top)
         total = jnp.sum(weights)
         info = _mixture_info(model, row, before, every_info, top + jnp.log(total))

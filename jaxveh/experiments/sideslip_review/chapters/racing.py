@@ -219,7 +219,7 @@ def metrics(mean, std, known, truth, held) -> dict[str, Any]:
     late = delay_of_rows(jnp.where(finite, mean, 0.0), truth, warm & finite, LATEST)
     return {
         "rmse": rms(warm & finite), "early": rms(warm & finite & (rows < half)), "late": rms(finite & (rows >= half)),
-        "rmse_known": rms(sure), "worst": jnp.max(jnp.where(warm & finite, jnp.abs(error), 0.0)),
+        "rmse_known": rms(sure), "worst": numerics.largest(jnp.where(warm & finite, jnp.abs(error), 0.0)),
         "known": count(warm & known) / count(warm),
         "nees": rms(claimed, error / numerics.or_one(std, claimed)) ** 2,
         "delay": STEP * late, "failed": 1.0 - jnp.all(finite | ~warm).astype(error.dtype),
