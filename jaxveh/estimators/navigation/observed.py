@@ -151,10 +151,11 @@ def axle_slip(system: Navigator, x, u) -> tuple[Any, Any, Any]:
     if system.parts.axle == "linear":
         angle, slope = share / stiffness, numerics.as_wide_as(1.0 / stiffness, share)
     else:
-        used = numerics.smooth_clip(share / system.grip, -SATURATED, SATURATED, BEND)
+        grip = system.grip * (jnp.exp(x.gripping) if system.parts.adapts else 1.0)
+        used = numerics.smooth_clip(share / grip, -SATURATED, SATURATED, BEND)
         # Slightly above zero, because a power of zero has no derivative.
         rest = 1.0 - numerics.sqrt(jnp.square(used) + 1e-12) ** system.shape
-        angle = used * system.grip / stiffness * rest ** (-1.0 / system.shape)
+        angle = used * grip / stiffness * rest ** (-1.0 / system.shape)
         slope = rest ** (-1.0 - 1.0 / system.shape) / stiffness
     return jnp.clip(angle, -STEEPEST, STEEPEST), slope, share
 
