@@ -200,7 +200,7 @@ def states_of(parts: Parts) -> dict[str, tuple[float, float, float]]:
         # Files of cars are wrong by factors of 0.6 to 1.6; roads have less grip than the one of the file.
         states |= {"stiffening": (0.0, 0.3, 0.01)}
         if parts.axle == "saturating":
-            states |= {"gripping": (0.0, 0.15, 0.02)}
+            states |= {"gripping": (0.0, 0.3, 0.05)}
     if parts.camera:
         states |= {
             "lane_offset": (0.0, 1.0, 0.01),
@@ -259,13 +259,14 @@ def transition(system: Navigator, t0, t1, x, u):
     now = u.at(0.5 * (t0 + t1))
     a_x, a_y = system.accelerations(x, now)
     turned = dt * (now.yaw_rate - x.bias_yaw_rate)
+    headed = dt * system.heading_rate(x, now)
     v_x, v_y = rotate(x.v_x, x.v_y, turned)
     gained_x, gained_y = rotate(dt * a_x, dt * a_y, 0.5 * turned)
     fade = lambda time: jnp.exp(-dt / time)
     moved = {
         "v_x": v_x + gained_x,
         "v_y": v_y + gained_y,
-        "yaw": x.yaw + dt * system.heading_rate(x, now),
+        "yaw": x.yaw + headed,
         "bank": fade(system.bank_time) * x.bank,
         "grade": fade(system.grade_time) * x.grade,
     }
@@ -275,8 +276,8 @@ def transition(system: Navigator, t0, t1, x, u):
     if parts.axle != "none":
         moved["slip_error"] = fade(system.slip_time) * x.slip_error
     if parts.camera:
-        middle = x.lane_heading + 0.5 * (turned - dt * x.v_x * x.bend)
-        moved["lane_heading"] = x.lane_heading + turned - dt * x.v_x * x.bend
+        middle = x.lane_heading + 0.5 * (headed - dt * x.v_x * x.bend)
+        moved["lane_heading"] = x.lane_heading + headed - dt * x.v_x * x.bend
         ahead, aside = 0.5 * (x.v_x + moved["v_x"]), 0.5 * (x.v_y + moved["v_y"])
         moved["lane_offset"] = x.lane_offset + dt * (ahead * numerics.sin(middle) + aside * numerics.cos(middle))
         moved["bend"] = fade(system.bend_time) * x.bend
