@@ -25,9 +25,12 @@ UNITS = {
 
 
 class Drive:
-    """The motion, finely: `t`, `v_x`, `v_y`, `yaw_rate`, `yaw`, `a_x`, `a_y`, `x`, `y`, each an array."""
+    """The motion, finely: `t`, `v_x`, `v_y`, `yaw_rate`, `yaw`, `a_x`, `a_y`, `x`, `y`, each an array. `grip`: largest force of the
+    rear axle over its load."""
 
-    def __init__(self, duration, speed=20.0, stiffness=CAR.rear_cornering_stiffness, turn=0.2, phase=0.0):
+    def __init__(
+        self, duration, speed=20.0, stiffness=CAR.rear_cornering_stiffness, turn=0.2, phase=0.0, grip=np.inf, shape=2.5
+    ):
         dt = STEP / FINE
         self.t = t = np.arange(-EARLY, duration, dt)
         self.v_x = speed + 2.0 * np.sin(0.4 * t + phase)
@@ -42,7 +45,9 @@ class Drive:
         v_y = np.empty_like(t)
         v_y[0] = b * self.yaw_rate[0]
         for k in range(len(t) - 1):
-            a_y = gains[k] * slope * (b * self.yaw_rate[k] - v_y[k]) / self.v_x[k] + swing[k]
+            linear = slope * (b * self.yaw_rate[k] - v_y[k]) / self.v_x[k]
+            bent = linear / (1.0 + abs(linear / (G * grip)) ** shape) ** (1.0 / shape)
+            a_y = gains[k] * bent + swing[k]
             v_y[k + 1] = v_y[k] + dt * (a_y - self.v_x[k] * self.yaw_rate[k])
         self.v_y = v_y
         self.a_y = np.gradient(v_y, t) + self.v_x * self.yaw_rate
