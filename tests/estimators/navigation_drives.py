@@ -25,8 +25,8 @@ UNITS = {
 
 
 class Drive:
-    """The motion, finely: `t`, `v_x`, `v_y`, `yaw_rate`, `yaw`, `a_x`, `a_y`, `x`, `y`, each an array. `grip`: largest force of the
-    rear axle over its load."""
+    """The motion, finely: `t`, `v_x`, `v_y`, `yaw_rate`, `yaw`, `a_x`, `a_y`, `x`, `y`, each an array. `grip`: largest force of
+    the rear axle over its load."""
 
     def __init__(
         self, duration, speed=20.0, stiffness=CAR.rear_cornering_stiffness, turn=0.2, phase=0.0, grip=np.inf, shape=2.5

@@ -172,9 +172,10 @@ def heard_with(ratio, name="sedan", count=3):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(("quantity", "least"), [("sideslip", 1.2), ("navigation", 1.15), ("bank", 1.15)])
+@pytest.mark.parametrize(("quantity", "least"), [("sideslip", 1.2), ("navigation", 1.05), ("bank", 1.15)])
 def test_simulated_cars_are_estimated_as_well_as_with_straight_rear_wheels(quantity, least):
-    """`least`: how much larger the error is at least if nobody tells of the rear wheels."""
+    """`least`: how much larger the error is at least if nobody tells of the rear wheels; navigation takes wheels that are turned
+    against the front for a softer or stiffer axle, which it estimates."""
     field = "bank" if quantity == "bank" else "sideslip"
     entry, errors = QUANTITIES[quantity].METHODS[QUANTITIES[quantity].RECOMMENDED], {}
     for kind, ratio in RATIOS.items():
