@@ -93,6 +93,13 @@ def test_each_function_that_is_marked_by_hand_has_a_case_in_one_part_of_a_hundre
         time_budget.mark_rare(items, part)
         parts.append(rare(items))
     assert set().union(*parts) == rare(every) and sum(map(len, parts)) == 60
+    # Three cases a function: the hundreds of three parts reach them all.
+    reached = []
+    for part in range(300):
+        items = by_hand()
+        time_budget.mark_rare(items, part)
+        reached.extend(rare(items))
+    assert sorted(reached) == sorted(item.nodeid for item in by_hand())
 
 
 def test_a_file_alone_runs_the_cases_that_it_runs_among_all(tmp_path, monkeypatch):
