@@ -211,6 +211,7 @@ def test_the_axle_s_stiffness_is_found_where_the_file_is_wrong():
     assert errors[0] < 0.2 * DEGREE and errors[0] < 0.5 * errors[1], errors
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("grip", [0.35, 0.6])
 def test_the_axle_s_grip_is_found_where_the_road_has_another_one(grip):
     """Told 1.0, sideslip is nearly as good as told the road's grip, and much better than with a grip that cannot change."""
@@ -310,6 +311,7 @@ def lane_log(drive, camera, seed=None):
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("factor", [0.5, 0.7])
 def test_a_camera_helps_where_nothing_has_told_the_axle_s_stiffness(factor):
     """Satellites that told it before their outage make up for the camera (where both know it, both are within 0.1 degrees)."""
