@@ -14,8 +14,8 @@ marked `whole`: each of its cases is the only one that looks at a member's numbe
 What is marked `full` by hand takes minutes. One case of each such function is `rare`, so that each is run by somebody.
 
 `JAXVEH_PART=0` to `9999` leaves four fifths of what is `thorough` or of the `studies`, 19 twentieths of what is `seldom`, and 99
-hundredths of what is `rare`, to `-m full`; its hundreds choose the case of a function that is `rare`, so that in time each case is
-run. `.ci/run` takes the part that the commit decides, so that changes in a row run all of them, and the same commit always the
+hundredths of what is `rare`, to `-m full`; its hundreds choose the case of a function that is `rare`, and in time all are run.
+`.ci/run` takes the part that the commit decides, so that changes in a row run all of them, and the same commit always the
 same: all of them at once would take it hours. Without it all run, one case of each function.
 """
 
