@@ -226,8 +226,8 @@ def test_the_axle_s_grip_is_found_where_the_road_has_another_one(grip):
     prior = lambda method: method.model.prior.law.std.gripping
     stuck = eqx.tree_at(lambda one: (noise(one), prior(one)), of(1.0), (jnp.asarray(1e-5), jnp.asarray(1e-5)))
     error = lambda method: rmse(navigation.estimate(method, log, method="rear_axle")["sideslip"], truth, LATE)
-    found, told, stuck = error(of(1.0)), error(of(grip)), error(stuck)
-    assert found < 1.3 * told and found < 0.6 * stuck, (found / DEGREE, told / DEGREE, stuck / DEGREE)
+    found, told, fixed = error(of(1.0)), error(of(grip)), error(stuck)
+    assert found < 1.3 * told and found < 0.6 * fixed, (found / DEGREE, told / DEGREE, fixed / DEGREE)
 
 
 @pytest.mark.parametrize("three_more", [False, True])
@@ -320,6 +320,15 @@ def test_a_camera_helps_where_nothing_has_told_the_axle_s_stiffness(factor):
     truth, late = np.arctan2(soft.at("v_y", log.time), soft.at("v_x", log.time)), slice(int(2.0 / STEP), None)
     error = lambda method: rmse(navigation.estimate(CAR, log, method=method)["sideslip"], truth, late)
     assert error("camera") < 0.7 * error("rear_axle")
+
+
+@pytest.mark.thorough
+@pytest.mark.xfail(strict=True, reason="told its stiffness, the axle alone has 0.068 degrees, with a camera 0.076")
+def test_a_camera_helps_where_satellites_have_told_the_axle_s_stiffness(drive):
+    log = silent(lane_log(drive, LANE_CAMERA, 7), 15.0, 38.0, "speed", "course")
+    truth = np.arctan2(drive.at("v_y", log.time), drive.at("v_x", log.time))
+    error = lambda method: rmse(navigation.estimate(CAR, log, method=method)["sideslip"], truth, LATE)
+    assert error("camera") < error("rear_axle")
 
 
 def test_a_camera_sees_lane_and_lateral_velocity_slow_and_late(drive):

@@ -171,8 +171,16 @@ def heard_with(ratio, name="sedan", count=3):
     return cases, truths, time
 
 
+TAKEN_UP = pytest.mark.xfail(
+    strict=True, reason="the axle that is estimated takes it up: 1.10 against the front wheels"
+)
+
+
 @pytest.mark.full
-@pytest.mark.parametrize(("quantity", "least"), [("sideslip", 1.2), ("navigation", 1.05), ("bank", 1.15)])
+@pytest.mark.parametrize(
+    ("quantity", "least"),
+    [("sideslip", 1.2), ("navigation", 1.05), pytest.param("navigation", 1.15, marks=TAKEN_UP), ("bank", 1.15)],
+)
 def test_simulated_cars_are_estimated_as_well_as_with_straight_rear_wheels(quantity, least):
     """`least`: how much larger the error is at least if nobody tells of the rear wheels; navigation takes wheels that are turned
     against the front for a softer or stiffer axle, which it estimates."""

@@ -153,7 +153,8 @@ class Navigator(AbstractTwoAxles):
         return x.bank + x.lean_gradient * f_y, -self.dip_gradient * f_x - x.grade
 
     def heading_rate(self, x, u) -> Any:
-        """Rate of the yaw angle (rad/s), about the vertical: the body rolls and pitches, and its gyroscopes with it."""
+        """Rate of the yaw angle (rad/s), about the vertical, to the left: the body rolls and pitches, and its gyroscopes with it
+        (`(q sin(roll) + r cos(roll)) / cos(pitch)` of the pitch rate q and yaw rate r that it feels)."""
         roll, pitch = self.tilts(x, u)
         rate, upright = u.yaw_rate - x.bias_yaw_rate, numerics.cos(pitch)
         if self.parts.three_more:
@@ -260,6 +261,7 @@ def transition(system: Navigator, t0, t1, x, u):
     a_x, a_y = system.accelerations(x, now)
     turned = dt * (now.yaw_rate - x.bias_yaw_rate)
     headed = dt * system.heading_rate(x, now)
+    # Accelerometers lean as the gyroscope does: the velocity, which both drive, turns by what it feels.
     v_x, v_y = rotate(x.v_x, x.v_y, turned)
     gained_x, gained_y = rotate(dt * a_x, dt * a_y, 0.5 * turned)
     fade = lambda time: jnp.exp(-dt / time)
