@@ -28,6 +28,7 @@ from jaxveh.numerics.random import cauchy, exponential, normal, normals, student
 from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
 from jaxveh.numerics.roots import secant
 from jaxveh.numerics.scan_last import scan_batch_last
+from jaxveh.numerics.scan_written_out import scan_written_out
 from jaxveh.numerics.small_systems import solve_scalars
 from jaxveh.numerics.smooth import smooth_bump, smooth_clip, smooth_ramp, smooth_step
 from jaxveh.numerics.sums import total
@@ -35,7 +36,7 @@ from jaxveh.numerics.tables import interpolate_linear, interpolate_smooth
 from jaxveh.numerics.tangents import derivative_alone
 from jaxveh.numerics.triangular import lower_factor
 from jaxveh.numerics.widths import as_wide_as
-from jaxveh.numerics.written_out import as_entries, as_whole, from_entries, scan_written_out, write_out
+from jaxveh.numerics.written_out import as_entries, as_whole, from_entries, write_out
 
 __all__ = [
     "RUNS",

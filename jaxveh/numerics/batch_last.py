@@ -51,6 +51,29 @@ def evaluate(program: Any, operands: Sequence[Any], size: int) -> list:
     return [read(one) for one in jaxpr.outvars]
 
 
+def results_of_batch(program: Any, of_batch: Sequence[bool]) -> list[bool]:
+    """Which results of a program are of the batch, if these operands are."""
+    jaxpr = getattr(program, "jaxpr", program)
+    found = dict.fromkeys(jaxpr.constvars, False) | dict(zip(jaxpr.invars, of_batch, strict=True))
+    read = lambda one: not isinstance(one, core.Literal) and found[one]
+    for equation in jaxpr.eqns:
+        name, given = equation.primitive.name, [read(one) for one in equation.invars]
+        if name in CALLS or name == "custom_jvp_call":
+            results = results_of_batch(equation.params["call_jaxpr" if name == "custom_jvp_call" else "jaxpr"], given)
+        elif name == "cond" and not given[0]:
+            results = _any_branch_of_batch(equation.params["branches"], given[1:])
+        elif name in FENCES:
+            results = given
+        else:
+            results = [any(given)] * len(equation.outvars)
+        found.update(zip(equation.outvars, results, strict=True))
+    return [read(one) for one in jaxpr.outvars]
+
+
+def _any_branch_of_batch(branches: Sequence[Any], given: Sequence[bool]) -> list[bool]:
+    return [any(several) for several in zip(*(results_of_batch(one, given) for one in branches), strict=True)]
+
+
 def _only_summed(jaxpr: Any) -> set:
     """The variables that are read by one sum and by nothing else."""
     readers: dict[Any, list] = {}
@@ -139,16 +162,21 @@ def _branches(params: dict[str, Any], operands: list, out: list, size: int) -> l
     of_batch = [isinstance(one, Last) for one in rest]
     arrays = [one.array if last else one for one, last in zip(rest, of_batch, strict=True)]
 
+    branches, platforms = params["branches"], params.get("branches_platforms")
+    results = _any_branch_of_batch(branches, of_batch)
+
     def taken(branch):
         def run(*some):
             found = evaluate(branch, as_last(some, of_batch), size)
-            return [wide(one, like.shape, size) for one, like in zip(found, out, strict=True)]
+            return [
+                wide(one, like.shape, size) if last else jnp.asarray(one, like.dtype)
+                for one, like, last in zip(found, out, results, strict=True)
+            ]
 
         return run
 
-    branches, platforms = params["branches"], params.get("branches_platforms")
     if platforms is not None:  # a choice by platform, which is known here
         here = "cpu" if on_cpu() else jax.default_backend()
         chosen = next(i for i, names in enumerate(platforms) if names is None or here in names)
-        return [Last(one) for one in taken(branches[chosen])(*arrays)]
-    return [Last(one) for one in lax.switch(index, [taken(branch) for branch in branches], *arrays)]
+        return as_last(taken(branches[chosen])(*arrays), results)
+    return as_last(lax.switch(index, [taken(branch) for branch in branches], *arrays), results)

@@ -56,43 +56,6 @@ def scalars_of(program: Any) -> int:
 PyTree = Any
 
 
-def scan_written_out(
-    body: Callable, start: PyTree, rows: PyTree, *, reverse: bool = False, complete: bool = False
-) -> tuple[PyTree, PyTree]:
-    """The result of `jax.lax.scan(body, start, rows, reverse=reverse)`, with the body written out in scalars and checkpointed.
-
-    `rows` has at least one array. The carry is written out in scalars, too. The scan is differentiable in both modes,
-    like `body`; a product of a known zero and NaN is zero. `complete`: every number of `rows` is finite, so that values
-    that depend only on missing measurements are known when traced.
-    """
-    carried, structure = jax.tree.flatten(start)
-    row = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(np.shape(leaf)[1:], leaf.dtype), rows)
-    closed, shapes = jax.make_jaxpr(body, return_shape=True)(start, row)
-    results = [jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(shapes)]
-    inner, outer = results[: len(carried)], results[len(carried) :]
-
-    def scalars(carry: list, row: PyTree) -> tuple[list, list]:
-        given = [entries(leaf) for leaf in jax.tree.leaves(row)]
-        found = evaluate(
-            closed, split(carry, [one.shape for one in inner]) + given, entry_list(given) if complete else ()
-        )
-        # Values that the next row uses are computed once.
-        return fence(_scalars(found[: len(inner)], inner)), _scalars(found[len(inner) :], outer)
-
-    first = _scalars([entries(leaf) for leaf in carried], inner)
-    last, columns = lax.scan(jax.checkpoint(scalars, prevent_cse=False), first, rows, reverse=reverse)
-    end = [array_of(those, one.dtype) for those, one in zip(split(last, [o.shape for o in inner]), inner, strict=True)]
-    count = len(jax.tree.leaves(rows)[0])
-    shown = [
-        jnp.stack(some.tolist(), axis=1).reshape(count, *one.shape)
-        if some.size
-        else jnp.zeros((count, *one.shape), one.dtype)
-        for some, one in zip(split(columns, [(math.prod(o.shape),) for o in outer]), outer, strict=True)
-    ]
-    carry, stacked = jax.tree.unflatten(jax.tree.structure(shapes), [*end, *shown])
-    return jax.tree.unflatten(structure, jax.tree.leaves(carry)), stacked
-
-
 def write_out(function: Callable, *operands: PyTree, complete: bool = False) -> PyTree:
     """`function(*operands)`, written out in scalars; `complete`: every number of the operands is finite."""
     closed, shapes = jax.make_jaxpr(function, return_shape=True)(*operands)
@@ -153,7 +116,7 @@ def _is_ruled(params: dict[str, Any], equation: Any) -> bool:
     return floating and params.get("num_consts") == 0 and hasattr(params.get("jvp_jaxpr_fun"), "call_wrapped")
 
 
-def _scalars(found: Sequence[Entries], like: Sequence[Any]) -> list[jax.Array]:
+def scalars_from(found: Sequence[Entries], like: Sequence[Any]) -> list[jax.Array]:
     """The entries of results as JAX scalars, each of the dtype of its array."""
     return [scalar_of(entry, one.dtype) for those, one in zip(found, like, strict=True) for entry in those.reshape(-1)]
 
@@ -187,7 +150,7 @@ def _branches(branches: Any, operands: list[Entries], out: list, finite: Sequenc
 
     def taken(branch):
         def run(*some):
-            return _scalars(evaluate(branch, split(fill(some), shapes), finite), out)
+            return scalars_from(evaluate(branch, split(fill(some), shapes), finite), out)
 
         return run
 
@@ -206,7 +169,7 @@ def _with_rule(params: dict[str, Any], operands: list[Entries], given: list, out
 
     @jax.custom_jvp
     def function(*some):
-        return _scalars(call(some), out)
+        return scalars_from(call(some), out)
 
     @function.defjvp
     def _(primals, tangents):
@@ -219,7 +182,7 @@ def _with_rule(params: dict[str, Any], operands: list[Entries], given: list, out
         values, slopes = found[: len(out)], iter(found[len(out) :])
         none = lambda one: entries(np.zeros(one.shape, one.dtype))
         moving = [none(one) if nothing else next(slopes) for one, nothing in zip(out, zero, strict=True)]
-        return _scalars(values, out), _scalars(moving, out)
+        return scalars_from(values, out), scalars_from(moving, out)
 
     return split(function(*(items[i] for i in places)), [one.shape for one in out])
 

@@ -160,6 +160,55 @@ def test_batches_of_batches_and_second_derivatives():
     close(last, whole, 1e-10)
 
 
+SCANS = {"batch last": numerics.scan_batch_last, "written out": numerics.scan_written_out}
+
+
+def of_shared_numbers(scan, numbers, x, apart):
+    """The sum over runs of a scan whose body reads numbers that all runs share; unless all is `apart`, a part of the carry
+    depends on nothing else."""
+    a, b = numbers
+
+    def body(c, r):
+        alone = b[0] * c[1] + (0.1 * c[0][0] if apart else 0.0)
+        return (jnp.sin(a * c[0] + r) + b * c[0][::-1] * alone, alone), jnp.sum(c[0]) * alone + a
+
+    def run(x):
+        (end, alone), shown = scan(body, (x, jnp.asarray(0.7)), jnp.linspace(0.1, 0.9, 4))
+        return jnp.sum(end) * alone + jnp.sum(shown**2)
+
+    return jnp.sum(jax.vmap(run)(x))
+
+
+@pytest.mark.parametrize("apart", [True, False], ids=["all of the batch", "a part shared"])
+@pytest.mark.parametrize("name", SCANS)
+def test_derivatives_by_what_all_runs_share(name, apart):
+    numbers, x = (jnp.asarray(0.8), jnp.asarray([0.3, -0.6])), jnp.linspace(-1.0, 1.0, 2 * RUNS).reshape(RUNS, 2)
+    every = lambda f: (
+        jax.value_and_grad(f, (0, 1))(numbers, x),
+        jax.jvp(f, (numbers, x), jax.tree.map(jnp.ones_like, (numbers, x))),
+        jax.hessian(f, (0, 1))(numbers, x),
+        jax.vmap(jax.grad(lambda a: f((a, numbers[1]), x)))(jnp.linspace(0.1, 0.9, 3)),
+    )
+    whole, last = (
+        jax.jit(lambda scan=scan: every(lambda numbers, x: of_shared_numbers(scan, numbers, x, apart)))()
+        for scan in (lax.scan, SCANS[name])
+    )
+    close(last, whole, 1e-10)
+
+
+@pytest.mark.parametrize("name", SCANS)
+def test_the_sum_over_the_runs_is_taken_once_and_not_in_every_step(name):
+    def sums_of_steps(apart):
+        numbers, x = (jnp.asarray(0.8), jnp.asarray([0.3, -0.6])), jnp.ones((RUNS, 2))
+        program = jax.make_jaxpr(jax.grad(lambda n: of_shared_numbers(SCANS[name], n, x, apart)))(numbers)
+        bodies = [one.params["jaxpr"].jaxpr for one in program.jaxpr.eqns if one.primitive.name == "scan"]
+        assert bodies and any(one.primitive.name == "jaxveh_steps" for body in bodies for one in body.eqns)
+        return sum(one.primitive.name == "reduce_sum" for body in bodies for one in body.eqns)
+
+    assert sums_of_steps(apart=True) == 0
+    assert sums_of_steps(apart=False) > 0
+
+
 def test_a_factor_of_an_indefinite_matrix_is_not_a_number():
     factor = numerics.cholesky
     matrices = jnp.stack([jnp.eye(N), jnp.eye(N).at[4, 4].set(-1.0)])
