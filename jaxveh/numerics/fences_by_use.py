@@ -1,16 +1,17 @@
 """Places the fences of a program by the uses of its values.
 
 XLA on the CPU makes loops with one result each: a value that two of them need is computed in both, with everything that
-it depends on, unless it is fenced. In a step of a filter and above all in its derivative, this doubles the work: per step,
-250 unscented filters of three states take 18.7 instead of 25.1 us, and their gradient 87 instead of 140 (jax 0.12, float64).
-Here a value of an elementwise program is fenced if the loops that need it compute more to get it again than a loop of its
-own costs, or if its loop has become long. Equal values are computed once.
+it depends on, unless it is fenced. In a step of a filter, and above all in its derivative, this doubles the work: with
+fences by use 250 unscented filters of three states take 15 instead of 22 us per step, and their values with the gradient
+70 instead of 153 (jax 0.12, float64, AMD EPYC).
+
+A value of an elementwise program is fenced if computing it in all loops that need it costs more than a loop of its own, or
+if its loop has become long. Equal values are computed once.
 """
 
 from __future__ import annotations
 
 import collections
-import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -135,13 +136,15 @@ def _fenced(equations: Sequence[Any], results: Sequence[Any], value: Any) -> set
     """The variables to be fenced."""
     reads = [[value(one) for one in _variables(equation.invars)] for equation in equations]
     fenced: set[Any] = set()
-    for turn in itertools.count():
+    turn = 0
+    while True:
         costs, long = _costs(equations, reads, fenced)
         # From some turn on fences only come, so that there is an end.
         before, fenced = fenced, fenced.union(long) if turn >= TURNS else set(long)
         fenced |= _needed_twice(equations, reads, results, costs, fenced)
         if fenced == before:
             return fenced
+        turn += 1
 
 
 def _needed_twice(
