@@ -114,7 +114,7 @@ def _spread(of_batch: list[bool], program: Any, fixed: int, carried: int) -> tup
 
 
 def _shared(of_batch: list[bool], results: list[bool], program: Any, fixed: int, carried: int) -> list[int]:
-    """The places of operands that all runs share and of which only results of the batch depend."""
+    """The places of operands that all runs share and on which only results of the batch depend."""
     floating = [jnp.issubdtype(one.dtype, jnp.inexact) for one in program.in_avals[:fixed]]
     places = [i for i in range(fixed) if floating[i] and not of_batch[i]]
     as_if = [last or i in places for i, last in enumerate(of_batch)]
