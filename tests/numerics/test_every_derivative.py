@@ -116,7 +116,7 @@ CASES: dict[str, Callable] = {
     "interpolate_linear": table(numerics.interpolate_linear),
     "interpolate_smooth": table(numerics.interpolate_smooth),
     "inverse_psd": lambda x: mixed(numerics.inverse_psd(factor(x))),
-    "largest": lambda x: numerics.largest(jnp.sin(x * count(x, 0, 1, -1, 0.5))),
+    "largest": lambda x: numerics.largest(jnp.sin(x + count(x, 0, 1, -1, 0.5))),
     "log": lambda x: numerics.log(1.5 + x),
     "log_det": lambda x: numerics.log_det(factor(x)),
     "lower_factor": lambda x: mixed(numerics.lower_factor(jnp.concatenate([factor(x), matrix(x)], axis=1))),
@@ -128,7 +128,7 @@ CASES: dict[str, Callable] = {
         lambda y, a: a[0] * y**3 + y - a[1], (1 + x * x, 2 + x), jnp.ones_like(x) / 2, jnp.ones_like(x), 1e-13
     ),
     "sin": lambda x: numerics.sin(3 * x),
-    "smallest": lambda x: numerics.smallest(jnp.sin(x * count(x, 0, 1, -1, 0.5))),
+    "smallest": lambda x: numerics.smallest(jnp.sin(x + count(x, 0, 1, -1, 0.5))),
     "smooth_bump": lambda x: numerics.smooth_bump(0.4 + 0.5 * x),
     "smooth_clip": lambda x: numerics.smooth_clip(x, -1.5, jnp.cos(x) - 0.8, 0.6),
     "smooth_ramp": lambda x: numerics.smooth_ramp(x, 2.0 + x),
