@@ -123,7 +123,7 @@ CASES: dict[str, Callable] = {
     "mahalanobis": lambda x: numerics.mahalanobis(factor(x), sides(x)),
     "normalise": lambda x: sum(mixed(part) for part in numerics.normalise(jnp.sin(x * count(x, 0, 1, -1, 0.5)))[:2]),
     "as_wide_as": lambda x: joined((numerics.as_wide_as(x * x, sides(x)), numerics.as_wide_as(sides(x), x))),
-    "or_one": lambda x: (x - 1) / numerics.or_one(x - 0.4, x > 0.4) + jnp.sqrt(numerics.or_one(0.5 - x, x < 0.5)),
+    "or_one": lambda x: x / numerics.or_one(1 + x, x > 0.2) + x * jnp.sqrt(numerics.or_one(2 - x, x < 0.2)),
     "secant": lambda x: numerics.secant(
         lambda y, a: a[0] * y**3 + y - a[1], (1 + x * x, 2 + x), jnp.ones_like(x) / 2, jnp.ones_like(x), 1e-13
     ),
