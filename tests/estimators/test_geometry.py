@@ -54,6 +54,24 @@ def test_a_town_s_turns_make_the_ratio_known_and_a_weaving_that_play_swallows_do
     assert not weaving.known.steering_ratio.any()
 
 
+@pytest.mark.parametrize(("turned", "passed"), [(0.2, 0.01), (-0.2, 0.01), (0.2, -0.01), (-0.2, -0.01)])
+def test_on_a_circle_the_ratio_s_band_has_the_errors_of_gyroscope_and_wheels(turned, passed):
+    # The gyroscope's offset (degrees/s) and the wheels' radius are errors of one sign throughout: no number of rows helps.
+    method, rows = geometry.METHODS["learner"].make(CAR), 4000
+    speed = 5.0 + 4.0 * np.arange(rows) / rows
+    turn, radius = speed / 40.0, 40.0
+    f_y = speed**2 / radius
+    wheels = dict.fromkeys((f"wheel_speed_{at}" for at in ("fl", "fr", "rl", "rr")), speed * (1.0 + passed))
+    made = {
+        "a_y": f_y * (1.0 + G * CAR.roll_gradient), "yaw_rate": turn + np.radians(turned), "a_x": 0.0,
+        "steering_wheel": RATIO * (LENGTH / radius + UNDERSTEER * f_y), **wheels,
+    }  # fmt: skip
+    found = geometry.estimate(method, log(method.needs, made, rows))
+    error = np.abs(found["steering_ratio"] - RATIO) / np.asarray(found.std.steering_ratio)
+    known = np.asarray(found.known.steering_ratio)
+    assert error[-1] < 2.0 and error[known].max(initial=0.0) < 2.0
+
+
 def test_straight_running_tells_the_offset_and_nothing_else():
     method = told(CAR)
     found = geometry.estimate(method, drive(method.needs, offset=0.001, swing=0.0))

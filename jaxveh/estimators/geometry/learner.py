@@ -59,6 +59,9 @@ CALM = 0.15
 STAYS = 10.0
 """s: correlation time that is assumed for a constant error."""
 
+OF_THE_SPEED = 0.01
+"""Relative standard deviation of a ratio by errors of the wheels' radius and of the wheelbase, which no drive shows."""
+
 
 class LearnerMemory(NamedTuple):
     """The memory of the filter of roll and bank, `leaning`; the steering `wheel` angle (rad); the steer with the delay of the yaw
@@ -158,7 +161,7 @@ class Learner(AbstractMethod):
         # Rows count gradually less in hard turns and at low speed.
         doubt = 1.0 + jnp.square(jnp.square(memory.force / LINEAR)) + jnp.square(jnp.square(QUICK / fast))
         lasting = doubt * 2.0 * self.lasting / jnp.maximum(dt, 1e-3)
-        steering = self._fit_steering(memory, rate, fast, lasting, there)
+        steering = self._fit_steering(memory, rate, fast, said.std.yaw_rate_bias, lasting, there)
         turning = self._fit_turning(memory, steering, rate, fast, lasting, there)
         heading = said.std.yaw_rate_bias / jnp.maximum(fast, QUICK)
         # Share of the steering amplitude that is lost in the play.
@@ -197,14 +200,18 @@ class Learner(AbstractMethod):
         )
         return after, (turn_now - turn) / self.time
 
-    def _fit_steering(self, now: LearnerMemory, rate: Any, fast: Any, lasting: Any, there: Any) -> Belief:
-        """The fit of ratio, offset and understeer after a row with these low-passed signals. `lasting`: the factor on a row's
-        variance, since errors of neighbouring rows are alike (-); `there`: whether the row counts."""
+    def _fit_steering(
+        self, now: LearnerMemory, rate: Any, fast: Any, bias_std: Any, lasting: Any, there: Any
+    ) -> Belief:
+        """The fit of ratio, offset and understeer after a row with these low-passed signals. `bias_std`: standard deviation of
+        the yaw rate's offset (rad/s), in a steady turn an error of the ratio; `lasting`: the factor on a row's variance, since
+        errors of neighbouring rows are alike (-); `there`: whether the row counts."""
         curve = self.wheelbase * now.turn / fast + now.rear
         start = self._understeer() * now.force - self.yaw_inertia * self._place_slope() / self.mass * rate
         off = lambda x: now.steer - x.offset - (1.0 + x.ratio) * (curve + start + x.understeer * now.force)
         calm = 1.0 + jnp.square(jnp.square(rate / CALM))
-        seen = Measurement(off, jnp.square(self.steer_error) * lasting * calm, there)
+        stays = jnp.square(self.wheelbase * bias_std / fast) * (STAYS / self.lasting)
+        seen = Measurement(off, (jnp.square(self.steer_error) + stays) * lasting * calm, there)
         return correct(now.steering, seen, Steering)
 
     def _fit_turning(
@@ -265,7 +272,7 @@ class Learner(AbstractMethod):
             "yaw_inertia": self.yaw_inertia * inertia,
             "front_axle_to_cg": numerics.sqrt(jnp.maximum(left, 1e-8)),
             "steer_offset": numerics.hypot(numerics.hypot(std.offset, 0.5 * self.play), self.wheelbase * heading),
-            "steering_ratio": self.steering_ratio * numerics.hypot(std.ratio, swing),
+            "steering_ratio": self.steering_ratio * numerics.hypot(numerics.hypot(std.ratio, swing), OF_THE_SPEED),
         }
         return means, stds
 
