@@ -25,8 +25,9 @@ STRAIGHT = {"mu-jump-braking": "it goes straight ahead", "cruise": "it goes stra
 FRICTION, ROUGHNESS, BANK = (0.75, 1.0), (4e-6, 32e-6), 0.015
 """Range of the track's friction and unevenness (m^3), and standard deviation of its bank (rad) in every other drive."""
 
-SPUN, SLOWEST = np.radians(60.0), 2.0
-"""Sideslip (rad) from which on, and speed (m/s) up to which, a car is not driven any more: its log ends."""
+SPUN, SLOWEST = np.radians(60.0), 4.0
+"""Sideslip (rad) from which on, and speed (m/s) up to which, a car is not driven any more: its log ends. Below 3 m/s the steps
+of the simulation are too long for the wheels' spins, and accelerations are wrong by several m/s^2."""
 
 LEAST = 5.5
 """Shortest log, s."""
@@ -64,7 +65,7 @@ COURSES = {
 def track(course: str, runs: int, seed: int = 0) -> Iterator[Log]:
     """Yield the logs of `runs` drives of one of the `COURSES`, with every car in turn, simulated by one program.
 
-    A drive ends when its car has `SPUN` or stands, and is left out if that is sooner than `LEAST`.
+    A drive ends when its car has `SPUN` or is slower than `SLOWEST`, and is left out if that is sooner than `LEAST`.
     """
     rng, numbers = np.random.default_rng([seed, list(COURSES).index(course)]), cars()
     names = [list(numbers)[i % len(numbers)] for i in range(runs)]
