@@ -5,7 +5,6 @@ import jax
 import jax.numpy as jnp
 import method_logs
 import numpy as np
-import pytest
 from test_every_method import QUANTITIES, a_sixth, draws, every, made, stacked
 
 from jaxveh.estimators import kit

@@ -8,10 +8,9 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.body_motion import steer_heard
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.misfit import learn_misfit, no_misfit
-from jaxveh.estimators.rear_steer import rear_angle, rolls_across
+from jaxveh.estimators.rear_steer import rolls_across
 from jaxveh.estimators.sequential import (
     Belief,
     Innovation,
@@ -28,6 +27,7 @@ from jaxveh.estimators.speed.slip_state import (
     MAY_HELP,
     PATIENCE,
     RADII,
+    WRONG,
     Memory,
     Said,
     SpeedState,
@@ -35,14 +35,20 @@ from jaxveh.estimators.speed.slip_state import (
     beyond,
     bound_by_two,
     front_rear,
+    heard_in,
+    missed_in_turn,
     own_radii,
     roughness_of_wheels,
+    trust_of_wheels,
 )
 from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, wheel_values
 from jaxveh.estimators.two_axles import slip_stiffness
 from jaxveh.numerics import smooth_step
 from jaxveh.vehicles import GRAVITY
 from jaxveh.vehicles import kit as vehicles
+
+SLOWEST = 0.3
+"""m/s: a slower wheel says zero."""
 
 
 class SlipAware(AbstractMethod):
@@ -65,12 +71,14 @@ class SlipAware(AbstractMethod):
     likely wrong than the wheels, and the gate is five times as wide. A slipping wheel is left out, all four if necessary: then
     the filter integrates the accelerometer with the offset, gain and slope estimated before. While most wheels are at their limit
     and the force is beyond `bound_force` (m/s^2), two wheels that are faster than a braking car, or slower than a driven one,
-    bound its speed. If wheels agree with the accelerometer's rate for `patience` (s) and are still not trusted, the speed's
-    process noise is increased until they are. How noisy accelerometer, satellites and wheels are is learned, as their `Misfit`.
+    bound its speed. Several fixes of satellites in turn that are beyond `gate` are right (`slip_state.missed_in_turn`). A car
+    that turns near its limit may slide, and lose speed without feeling it (`Spreads.slides`). If wheels agree with the
+    accelerometer's rate for `patience` (s) and are still not trusted, the speed's process noise is increased until they are.
+    How noisy accelerometer, satellites and wheels are is learned, as their `Misfit`.
 
     **Delays** (s, of the production car): `a_x_delay` of the accelerometer and its low-pass filter, `wheel_delay` of wheel
-    speeds, half a period included, `satellite_delay`. The answer is for the present time: the belief, extrapolated by its
-    acceleration.
+    speeds, half a period included, and the time of a slow wheel from tooth to tooth (`tooth`, m), `satellite_delay`. The answer
+    is for the present time: the belief, extrapolated by its acceleration.
 
     `v_x` is known where its standard deviation is below `known_share` (-) of it plus `known_speed` (m/s). Reported: `v_x` (m/s);
     `grade` (rad), positive uphill, and `a_x_offset` (m/s^2), which are only distinguished by how fast they change.
@@ -91,6 +99,7 @@ class SlipAware(AbstractMethod):
     a_x_delay: jax.Array = positive("s", default=0.025)
     wheel_delay: jax.Array = positive("s", default=0.03)
     satellite_delay: jax.Array = positive("s", default=0.15)
+    tooth: jax.Array = positive("m", default=0.04)
     smoothing: jax.Array = positive("s", default=0.06)
     known_share: jax.Array = positive("-", default=0.02)
     known_speed: jax.Array = positive("m/s", default=0.15)
@@ -116,12 +125,12 @@ class SlipAware(AbstractMethod):
         ones = jnp.ones_like(wheels)
         memory = Memory(
             belief, t, dict.fromkeys(HELD, zero), dict.fromkeys(HELD, never), jnp.where(there, wheels, v_x), t * ones, ones,
-            jnp.zeros_like(ones), zero, t, no_misfit(3, t), (jnp.where(there, wheels, v_x),) * 2,
+            jnp.zeros_like(ones), zero, t, no_misfit(3, t), (jnp.where(there, wheels, v_x),) * 2, zero,
         )  # fmt: skip
         return memory, self._answer(memory)
 
     def next(self, memory: Memory, t, values):
-        heard, at = self._hear(memory, t, values)
+        heard, at = heard_in(self.car, memory, t, values)
         memory = memory._replace(heard=heard, at=at)
         step = jnp.maximum(t - memory.t, 0.0)
         belief = self._move(memory, step)
@@ -130,19 +139,12 @@ class SlipAware(AbstractMethod):
         belief = update(belief, told, self._gate(told, 2.0 * self.gate))
         memory = memory._replace(rate=self._smooth_rate(memory, belief, step))
         fix = self._satellite(memory, belief, values["speed"])
-        belief = update(belief, fix, self._gate(fix, self.gate))
+        missed = missed_in_turn(memory.missed, values["speed"], self._gate(fix, self.gate))
+        belief = update(belief, fix, self._gate(fix, self.gate * 2.0**memory.missed))
         misfit, lately = self._learn(memory, step, (told, values["a_x"]), (fix, values["speed"]), wheels)
         belief, memory = self._use_wheels(memory, belief, t, step, wheels)
-        memory = memory._replace(belief=belief, t=t, misfit=misfit, lately=lately)
+        memory = memory._replace(belief=belief, t=t, misfit=misfit, lately=lately, missed=missed)
         return memory, self._answer(memory)
-
-    def _hear(self, memory: Memory, t, values):
-        now = dict(values) | {"steer": steer_heard(values, self.car.steering_ratio, self.car.steer_offset)}
-        now["steer_rear"] = rear_angle(values, jnp.zeros_like(t))
-        torques = [values[f"torque_{place}"] for place in vehicles.CORNERS]
-        now["drive_torque"] = jnp.where(jnp.isnan(now["drive_torque"]), sum(torques), now["drive_torque"])
-        heard = {n: jnp.where(jnp.isnan(now[n]), memory.heard[n], now[n]) for n in HELD}
-        return heard, {n: jnp.where(jnp.isnan(now[n]), memory.at[n], t) for n in HELD}
 
     def _speaks(self, memory: Memory, name: str):
         return memory.t - memory.at[name] <= PATIENCE
@@ -174,8 +176,10 @@ class SlipAware(AbstractMethod):
             soft = [back * x.softness_front, back * x.softness_rear]
             return jnp.stack([rolled, x.force, falls * x.slope, *x[3:10], *soft, x.sinking])
 
-        lost = memory.t - memory.lost > self.patience
-        wander = s.speed_walk + jnp.where(lost, 1.0, 0.0)
+        lost = (memory.t - memory.lost > self.patience) | (memory.missed >= WRONG)
+        yaw_rate, a_y, _ = self._lateral(memory, SpeedState(*memory.belief.mean))
+        slides = s.slides * jnp.square(jnp.square(a_y / GRAVITY)) * yaw_rate * memory.belief.mean[0]
+        wander = numerics.hypot(s.speed_walk + jnp.where(lost, 1.0, 0.0), slides)
         soft = s.softness * numerics.sqrt(2.0 / s.softness_time)
         slope_walk = jnp.where(felt, s.slope_walk, 0.0)
         # The walk of each wheel's own radius is added below.
@@ -222,7 +226,8 @@ class SlipAware(AbstractMethod):
     def _wheels(self, memory: Memory, mean) -> Said:
         """The predicted wheels for a mean (n,)."""
         x, car = SpeedState(*mean), self.car
-        v_x = x.rolled - (self.wheel_delay - self.a_x_delay) * self._acceleration(memory, x)
+        lag = self.wheel_delay - self.a_x_delay + self.tooth / jnp.maximum(jnp.abs(x.rolled), SLOWEST)
+        v_x = x.rolled - lag * self._acceleration(memory, x)
         yaw_rate, a_y, _ = self._lateral(memory, x)
         along = v_x - LEFT.astype(v_x.dtype) * 0.5 * front_rear(car.track_front, car.track_rear) * yaw_rate
         steer = front_rear(memory.heard["steer"], memory.heard["steer_rear"])
@@ -260,7 +265,9 @@ class SlipAware(AbstractMethod):
         """The low-passed speeds of the wheels (m/s), and by how much each is trusted because its rate is the car's, (4,) each."""
         waited = jnp.where(there, t - memory.smooth_at, 0.0)
         mixed = 1.0 - jnp.exp(-waited / self.smoothing)
-        smooth = memory.smooth + mixed * (jnp.where(there, wheels, memory.smooth) - memory.smooth)
+        # A wheel that said zero turned at an unknown rate.
+        last = jnp.where(there & (memory.smooth == 0.0), wheels, memory.smooth)
+        smooth = last + mixed * (jnp.where(there, wheels, last) - last)
         rates = (jnp.where(there, wheels, smooth) - smooth) / self.smoothing
         # Without an accelerometer the car's rate is that of the wheels.
         gate = self.rate_gate * jnp.where(self._speaks(memory, "a_x"), 1.0, 4.0)
@@ -281,14 +288,14 @@ class SlipAware(AbstractMethod):
             one = self._wheels(memory, mean)
             return jnp.concatenate([one.speed + at_limit, one.rolling])
 
-        white, slow = self._wheel_variances(memory, belief, said)
+        white, slow = self._wheel_variances(memory, belief, said, wheels)
         slow = slow + jnp.square(at_limit)
         # Where one wheel locks or spins, the forces of the others are unknown.
         slow = slow + jnp.square(self.spreads.other_slip * numerics.largest(suspicion) * rolled)
         variances = jnp.concatenate([white + slow, numerics.as_wide_as(white, slow)])
         both = innovations(belief, expect, jnp.tile(wheels, 2), variances)
         found, rolling = (Innovation(*[part[rows] for part in both]) for rows in (slice(0, 4), slice(4, 8)))
-        now = self._gates(found, said, white + slow, there) * steady
+        now = trust_of_wheels(found, said, white + slow, there, self.gate, self.calm) * steady
         trusted = jnp.minimum(memory.trust + step / self.memory * (1.0 - memory.trust), 1.0)
         trust = jnp.where(there, jnp.minimum(now, trusted), trusted)
         # Errors that last for a while are not reduced by repeated measurements.
@@ -309,29 +316,19 @@ class SlipAware(AbstractMethod):
             lost=jnp.where(jnp.any(there & (trust > 0.5)) | strange, t, memory.lost),
         )
 
-    def _gates(self, found, said: Said, variance, there):
-        """The trust of each wheel by its innovation, (4,).
-
-        Where forces are small and the wheels agree, the belief is more likely wrong than all wheels, and the gate is wide.
-        """
-        apart = found.residual[:, None] - found.residual[None, :]
-        alike = jnp.exp(-jnp.square(apart) / (9.0 * (variance[:, None] + variance[None, :])))
-        others = jnp.sum(jnp.where(there[None, :], alike, 0.0), axis=1) - 1.0
-        agree = jnp.clip(others - 0.5, 0.0, 1.0)
-        calm = jnp.exp(-jnp.square(said.share / self.calm))
-        far = numerics.sqrt(jnp.square(found.residual) / found.variance)
-        return beyond(far / (self.gate * (1.0 + 4.0 * calm * agree)))
-
     def _white(self, belief: Belief):
         """The variance of a wheel's white noise that is assumed, (m/s)^2."""
         return jnp.square(self.spreads.wheel) + jnp.square(self.spreads.wheel_share * SpeedState(*belief.mean).rolled)
 
-    def _wheel_variances(self, memory: Memory, belief: Belief, said: Said):
+    def _wheel_variances(self, memory: Memory, belief: Belief, said: Said, wheels):
         s, x = self.spreads, SpeedState(*belief.mean)
         v_x, (yaw_rate, _, _) = jnp.abs(x.rolled), self._lateral(memory, x)
         near_limit = s.peak_slip * jnp.square(jnp.square(said.share))
         white = memory.misfit.times[2] * self._white(belief)
-        parts = [s.turn * yaw_rate, s.slip_share * said.slip * v_x, near_limit * v_x]
+        still = jnp.where(wheels == 0.0, s.still, 0.0)
+        # Half of the time from tooth to tooth.
+        waits = 0.5 * self.tooth / jnp.maximum(v_x, SLOWEST) * memory.rate
+        parts = [s.turn * yaw_rate, s.slip_share * said.slip * v_x, near_limit * v_x, still, waits]
         return white, sum(jnp.square(one) for one in parts)
 
     def _answer(self, memory: Memory):

@@ -8,11 +8,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxveh import numerics
 from jaxveh._core.parameter import positive
+from jaxveh.estimators.body_motion import steer_heard
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.misfit import OUTLIER, Misfit, white_part
+from jaxveh.estimators.rear_steer import rear_angle
 from jaxveh.estimators.sequential import Belief, Innovation, update
 from jaxveh.estimators.speed.accelerometer import AbstractOffsetAndSlope
+from jaxveh.estimators.speed.car_numbers import SpeedCar
 from jaxveh.vehicles import kit as vehicles
 
 LEFT = np.array([1, -1, 1, -1])
@@ -87,7 +91,11 @@ class Spreads(AbstractOffsetAndSlope):
     expected slip; `peak_slip` (-), unknown slip at a force equal to the load, which falls with the fourth power of the force;
     `limit_slip` (-), additional slip, expected and uncertain, of a wheel that was recently at its limit (it decays with
     `suspicion_time`, s); `other_slip` (-), slip of all wheels while one is at its limit, because the forces are then distributed
-    otherwise; `turn` (m/s per rad/s), error of the wheels' positions.
+    otherwise; `turn` (m/s per rad/s), error of the wheels' positions; `still` (m/s), speed of a wheel whose sensor says zero,
+    since slow teeth are not seen.
+
+    `slides` (rad sqrt(s)), times the fourth power of a_y over g, is the white noise of the sideslip angle by which a car that
+    turns loses speed without feeling it.
     """
 
     gain: jax.Array = positive("-", default=0.012)
@@ -109,6 +117,8 @@ class Spreads(AbstractOffsetAndSlope):
     other_slip: jax.Array = positive("-", default=0.015)
     repeats: jax.Array = positive("-", default=25.0)
     turn: jax.Array = positive("m/s per rad/s", default=0.05)
+    still: jax.Array = positive("m/s", default=0.1)
+    slides: jax.Array = positive("rad sqrt(s)", default=0.05)
     satellite: jax.Array = positive("m/s", default=0.06)
 
 
@@ -116,7 +126,8 @@ class Memory(NamedTuple):
     """The belief and its time `t` (s); the last measurements by channel, `heard`, and their times `at` (s); for each wheel the
     low-passed speed `smooth` (m/s), its time `smooth_at` (s), its `trust` (-), and the `suspicion` (-) that it is at its limit;
     the car's low-passed acceleration `rate` (m/s^2); the time `lost` (s) since which no wheel was trusted; the `misfit` of
-    accelerometer, satellites and wheels, and the last two speeds of each wheel, `lately` (m/s)."""
+    accelerometer, satellites and wheels, and the last two speeds of each wheel, `lately` (m/s); how many fixes in turn were
+    beyond the gate, `missed`."""
 
     belief: Belief
     t: Any
@@ -130,6 +141,7 @@ class Memory(NamedTuple):
     lost: Any
     misfit: Misfit
     lately: tuple[Any, Any]
+    missed: Any
 
 
 class Said(NamedTuple):
@@ -142,6 +154,16 @@ class Said(NamedTuple):
     share: Any
 
 
+def heard_in(car: SpeedCar, memory: Memory, t: Any, values: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The last measurements by channel after a row, and their times (s)."""
+    now = dict(values) | {"steer": steer_heard(values, car.steering_ratio, car.steer_offset)}
+    now["steer_rear"] = rear_angle(values, jnp.zeros_like(t))
+    torques = [values[f"torque_{place}"] for place in vehicles.CORNERS]
+    now["drive_torque"] = jnp.where(jnp.isnan(now["drive_torque"]), sum(torques), now["drive_torque"])
+    heard = {n: jnp.where(jnp.isnan(now[n]), memory.heard[n], now[n]) for n in HELD}
+    return heard, {n: jnp.where(jnp.isnan(now[n]), memory.at[n], t) for n in HELD}
+
+
 def front_rear(front: Any, rear: Any) -> Any:
     """The front value for the front wheels and the rear value for the rear wheels, (4,)."""
     return jnp.where(FRONT, front, rear)
@@ -151,6 +173,20 @@ def beyond(far: Any) -> Any:
     """1 where |far| <= 1, otherwise |far| to the power of -8; safe for very large values."""
     size = jnp.clip(jnp.abs(far), 1.0, 1e3)
     return 1.0 / jnp.square(jnp.square(jnp.square(size)))
+
+
+def trust_of_wheels(found: Innovation, said: Said, variance: Any, there: Any, gate: Any, calm: Any) -> Any:
+    """The trust of each wheel by its innovation, (4,): `gate` and `calm` of the method.
+
+    Where forces are small and the wheels agree, the belief is more likely wrong than all wheels, and the gate is wide.
+    """
+    apart = found.residual[:, None] - found.residual[None, :]
+    alike = jnp.exp(-jnp.square(apart) / (9.0 * (variance[:, None] + variance[None, :])))
+    others = jnp.sum(jnp.where(there[None, :], alike, 0.0), axis=1) - 1.0
+    agree = jnp.clip(others - 0.5, 0.0, 1.0)
+    little = jnp.exp(-jnp.square(said.share / calm))
+    far = numerics.sqrt(jnp.square(found.residual) / found.variance)
+    return beyond(far / (gate * (1.0 + 4.0 * little * agree)))
 
 
 def own_radii(std: Any) -> Any:
@@ -169,6 +205,20 @@ def roughness_of_wheels(wheels: Any, lately: tuple[Any, Any], white: Any) -> tup
     count = jnp.sum(there.astype(parts.dtype))
     mean = jnp.sum(jnp.where(there, parts, 0.0)) / jnp.maximum(count, 1.0)
     return jnp.where(count > 0, mean, jnp.nan), (jnp.where(there, wheels, last), jnp.where(there, last, before))
+
+
+WRONG, MOST_MISSED = 3.0, 10.0
+"""Fixes in turn after which the belief counts as wrong, and after which their gate grows no further."""
+
+
+def missed_in_turn(missed: Any, fix: Any, weight: Any) -> Any:
+    """How many fixes in turn were beyond the gate, after a row with this `fix` (NaN: none), whose `weight` by the gate this is.
+
+    One wrong fix is a reflection; several in turn are right, and the belief is wrong: it integrates an accelerometer without
+    knowing that the car slides across its own nose.
+    """
+    after = jnp.where(weight < 0.5, jnp.minimum(missed + 1.0, MOST_MISSED), 0.0)
+    return jnp.where(jnp.isnan(fix), missed, after)
 
 
 def bound_by_two(belief: Belief, rolling: Innovation, there: Any, white: Any, sure: Any) -> Belief:
