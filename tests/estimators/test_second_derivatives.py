@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import method_logs
 import numpy as np
+import pytest
 from test_every_method import QUANTITIES, a_sixth, draws, every, made, stacked
 
 from jaxveh.estimators import kit
@@ -14,6 +15,7 @@ FIRST, ROWS = 50, 60
 """In these rows channels fall silent and return."""
 
 
+@pytest.mark.seldom
 @a_sixth
 @every
 def test_second_derivatives_are_finite_and_those_of_the_gradient(quantity, name):
@@ -43,7 +45,10 @@ def test_second_derivatives_are_finite_and_those_of_the_gradient(quantity, name)
         return
 
     def misses(step):
-        """By how much changes of the gradient and differences of it differ, over the tolerance, of all numbers."""
+        """By how much a change of the gradient is outside those to both sides, over the tolerance: the worst number and this.
+
+        A filter that stops trusting a wheel bends sharply: the changes to both sides differ, and the derivative is between.
+        """
         moved = lambda sign: jax.tree.map(lambda leaf, d: leaf + sign * step * d, numbers, direction)
         ahead, behind = compute(moved(1.0), values)[0], compute(moved(-1.0), values)[0]
         worst = {}
@@ -53,12 +58,17 @@ def test_second_derivatives_are_finite_and_those_of_the_gradient(quantity, name)
             strict=True,
         ):
             size = np.abs(np.asarray(size)).max(initial=0.0)
-            error = np.abs((np.asarray(a) - np.asarray(b)) / (2.0 * step) - np.asarray(change)) * size
-            scale = (np.abs(np.asarray(change)) + 1e-3 * np.abs(np.asarray(slope)).max(initial=0.0)) * size + 1e-6
-            worst[jax.tree_util.keystr(path)] = (error / (1e-4 * scale)).max(initial=0.0)
-        return worst
+            here, change = np.asarray(slope), np.asarray(change)
+            sides = np.stack([np.asarray(a) - here, here - np.asarray(b)]) / step
+            outside = np.maximum(np.maximum(sides.min(0) - change, change - sides.max(0)), 0.0)
+            scale = (np.abs(change) + 1e-3 * np.abs(here).max(initial=0.0)) * size + 1e-6
+            worst[jax.tree_util.keystr(path)] = (outside * size / (1e-4 * scale)).max(initial=0.0)
+        return max(worst.items(), key=lambda one: one[1])
 
-    short = misses(1e-6)
-    if max(short.values()) > 1.0:  # where a filter amplifies its rounding, a longer difference is the better one
-        long = misses(1e-5)
-        assert max(long.values()) <= 1.0, max(long.items(), key=lambda one: one[1])
+    # Where a filter amplifies its rounding, a longer difference is the better one.
+    tried = {}
+    for step in (1e-6, 1e-5):
+        tried[step] = misses(step)
+        if tried[step][1] <= 1.0:
+            return
+    raise AssertionError(tried)
