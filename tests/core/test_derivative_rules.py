@@ -7,6 +7,8 @@ Fences (`numerics/fences.py`) stand here where they are made; who uses them need
 import ast
 from pathlib import Path
 
+import pytest
+
 import jaxveh
 
 SPECIAL = {
@@ -76,6 +78,7 @@ PLACES = {
     "numerics/resampling.py": {"stop_gradient": EVERY},
     "numerics/scan_last.py": {"Primitive": BATCH_LAST},
     "numerics/roots.py": {"stop_gradient": EVERY, "while_loop": EVERY},
+    "numerics/steps_last.py": {"Primitive": BATCH_LAST},
     "numerics/tangents.py": {"Primitive": SCORES},
     "numerics/triangular.py": {"custom_jvp": EVERY},
     "numerics/words.py": {"bitcast_convert_type": "whole numbers of random words"},
@@ -105,6 +108,7 @@ def found():
             yield place.as_posix(), special
 
 
+@pytest.mark.whole
 def test_every_place_is_listed_with_its_test():
     assert {path: sorted(special) for path, special in found()} == {p: sorted(lines) for p, lines in PLACES.items()}
 

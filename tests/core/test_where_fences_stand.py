@@ -3,6 +3,8 @@
 import ast
 from pathlib import Path
 
+import pytest
+
 import jaxveh
 
 ROOT = Path(jaxveh.__file__).parent
@@ -39,10 +41,12 @@ def test_formulas_are_fenced_at_their_ends():
         assert not why.endswith(" ns") or why in " ".join(found[place].replace("#", " ").split())
 
 
+@pytest.mark.whole
 def test_what_a_fence_is_made_of_stands_in_one_module():
     made = {"optimization_barrier", "UNUSED_NAN", "barriers_hold"}
     allowed = {"numerics/fences.py", "numerics/platform.py", "numerics/__init__.py"}
-    asks = {"numerics/random.py", "simulation/fixed_steps.py"}  # which of two forms is faster, of `barriers_hold`
+    # Which of two forms is faster, of `barriers_hold`.
+    asks = {"numerics/random.py", "numerics/steps_last.py", "simulation/fixed_steps.py"}
     users = {
         path.relative_to(ROOT).as_posix()
         for path in ROOT.rglob("*.py")
