@@ -59,6 +59,18 @@ def stacked(logs, needs, dtype=float):
     return time, {n.channel: jnp.stack([jnp.asarray(log[n.channel], dtype) for log in logs.values()]) for n in needs}
 
 
+def total_of(module, rest, time):
+    """A number that depends on all that a method shows in all rows, as a function of its numbers and of the rows; `rest`: the
+    method without its numbers."""
+
+    def total(numbers, values):
+        said = kit.follow_rows(eqx.combine(numbers, rest), time, values)
+        shown = [getattr(said.mean, field) for field in module.SHOWN]
+        return sum(jnp.mean(jnp.where(jnp.isfinite(one), one, 0.0) * jnp.cos(time)) for one in shown)
+
+    return total
+
+
 @every_quantity
 def test_the_functions_of_a_quantity_say_in_which_units_and_are_found_by_a_pickle(quantity):
     module = QUANTITIES[quantity]
@@ -216,12 +228,7 @@ def test_gradients_with_respect_to_its_numbers_and_its_rows_are_finite_and_right
     time, values = stacked({name: logs[name] for name in ("gaps", "standing")}, method.needs)
     values = jax.tree.map(lambda leaf: leaf[:, :120], values)
     numbers, rest = eqx.partition(method, eqx.is_inexact_array)
-
-    def total(numbers, values):
-        said = kit.follow_rows(eqx.combine(numbers, rest), time[:120], values)
-        shown = [getattr(said.mean, field) for field in module.SHOWN]
-        return sum(jnp.mean(jnp.where(jnp.isfinite(one), one, 0.0) * jnp.cos(time[:120])) for one in shown)
-
+    total = total_of(module, rest, time[:120])
     # One program for the slopes and for the differences: compiling takes longer than the slopes that nobody asks for.
     with_slopes = jax.jit(jax.vmap(jax.value_and_grad(total, argnums=(0, 1)), in_axes=(None, 0)))
     (here, _), slopes = with_slopes(numbers, values)

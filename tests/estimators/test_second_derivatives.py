@@ -6,9 +6,7 @@ import jax.numpy as jnp
 import method_logs
 import numpy as np
 import pytest
-from test_every_method import QUANTITIES, a_sixth, draws, every, made, stacked
-
-from jaxveh.estimators import kit
+from test_every_method import QUANTITIES, a_sixth, draws, every, made, stacked, total_of
 
 KINDS = ("gaps", "standing", "reverse", "falls silent")
 FIRST, ROWS = 50, 60
@@ -27,10 +25,7 @@ def test_second_derivatives_are_finite_and_those_of_the_gradient(quantity, name)
     # In proportion to the numbers themselves: each counts, whatever its unit.
     direction = jax.tree.map(lambda leaf: jnp.where(jnp.isfinite(leaf), leaf, 0.0), numbers)
 
-    def total(numbers, values):
-        said = kit.follow_rows(eqx.combine(numbers, rest), time, values)
-        shown = [getattr(said.mean, field) for field in module.SHOWN]
-        return sum(jnp.mean(jnp.where(jnp.isfinite(one), one, 0.0) * jnp.cos(time)) for one in shown)
+    total = total_of(module, rest, time)
 
     def with_change(numbers, values):
         return jax.jvp(lambda numbers: jax.grad(total)(numbers, values), (numbers,), (direction,))

@@ -304,25 +304,27 @@ def seen_by_teeth(t, v_x, pitch=0.04, lowest=0.28):
     return np.where(said < lowest, 0.0, said)
 
 
-def stop_and_go(start=0.0):
-    """A car that brakes, creeps against its brakes while the wheels say zero, and drives off; time and speed."""
-    t = 0.01 * np.arange(2000) + start
-    return t, np.interp(t - start, [0, 4, 7.7, 8, 14, 14.4, 20], [9, 9, 0.2, -0.09, -0.09, 0.1, 10.0])
+def late(t, values, lag):
+    return np.interp(t - lag, t, values)
+
+
+def fixes_of(t, v_x):
+    """The speed of satellites, five times a second."""
+    return np.where(np.arange(len(t)) % 20 == 0, late(t, np.abs(v_x), 0.15), np.nan)
 
 
 @pytest.mark.parametrize("satellites", [True, False])
 def test_a_car_that_creeps_and_drives_off_is_followed_within_the_band(satellites):
     """Beliefs that were too sure of zero took wheels and accelerometer for wrong, for three seconds."""
-    t, v_x = stop_and_go()
-    smooth = lambda values: np.convolve(np.pad(values, 15, mode="edge"), np.full(31, 1.0 / 31), "valid")
-    v_x = smooth(v_x)
-    late = lambda values, lag: np.interp(t - lag, t, values)
+    t = 0.01 * np.arange(2000)
+    # It brakes, creeps against its brakes while the wheels say zero, and drives off.
+    v_x = np.interp(t, [0, 4, 7.7, 8, 14, 14.4, 20], [9, 9, 0.2, -0.09, -0.09, 0.1, 10.0])
+    v_x = np.convolve(np.pad(v_x, 15, mode="edge"), np.full(31, 1.0 / 31), "valid")
     rate = np.gradient(v_x, t) * (1.0 + 9.81 * 0.005)
-    fixes = np.where(np.arange(len(t)) % 20 == 0, late(np.abs(v_x), 0.15), np.nan)
     said = speed.estimate(
         CAR,
-        log_of("slip_aware", t, late(seen_by_teeth(t, v_x), 0.03), a_x=late(rate, 0.025) + 0.1, a_y=0.0, yaw_rate=0.0,
-               steer=0.0, **({"speed": fixes} if satellites else {})),
+        log_of("slip_aware", t, late(t, seen_by_teeth(t, v_x), 0.03), a_x=late(t, rate, 0.025) + 0.1, a_y=0.0, yaw_rate=0.0,
+               steer=0.0, **({"speed": fixes_of(t, v_x)} if satellites else {})),
         method="slip_aware",
     )  # fmt: skip
     error, std = np.abs(said["v_x"] - v_x)[300:], np.asarray(said.std.v_x)[300:]
@@ -333,16 +335,12 @@ def test_a_car_that_creeps_and_drives_off_is_followed_within_the_band(satellites
 def test_a_car_that_slides_loses_speed_without_feeling_it():
     """At 20 degrees of sideslip the accelerometer misses a third of the braking: the satellites see it."""
     t = 0.01 * np.arange(1200)
-    fallen = np.clip(t - 5.0, 0.0, 2.0)
-    v_x = 20.0 - 5.5 * fallen
-    sliding = ((t > 5.0) & (t < 7.0)).astype(float)
-    late = lambda values, lag: np.interp(t - lag, t, values)
-    fixes = np.where(np.arange(len(t)) % 20 == 0, late(v_x, 0.15), np.nan)
-    wheels = np.stack([v_x * (1.0 - share * sliding) for share in (0.15, 0.1, 0.2, 0.1)])
+    v_x, sliding = 20.0 - 5.5 * np.clip(t - 5.0, 0.0, 2.0), ((t > 5.0) & (t < 7.0)).astype(float)
+    wheels = np.stack([late(t, v_x * (1.0 - share * sliding), 0.03) for share in (0.15, 0.1, 0.2, 0.1)])
     said = speed.estimate(
         CAR,
-        log_of("slip_aware", t, np.stack([late(one, 0.03) for one in wheels]), a_x=late(-3.0 * sliding, 0.025),
-               a_y=late(8.5 * sliding, 0.025), yaw_rate=late(0.7 * sliding, 0.025), steer=0.0, speed=fixes),
+        log_of("slip_aware", t, wheels, a_x=late(t, -3.0 * sliding, 0.025), a_y=late(t, 8.5 * sliding, 0.025),
+               yaw_rate=late(t, 0.7 * sliding, 0.025), steer=0.0, speed=fixes_of(t, v_x)),
         method="slip_aware",
     )  # fmt: skip
     error = np.abs(said["v_x"] - v_x)
